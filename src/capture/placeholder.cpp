@@ -1,0 +1,1 @@
+#include "loopd/frame.h"

@@ -1,0 +1,1 @@
+#include "loopd/config.h"

@@ -1,0 +1,1 @@
+#include "loopd/detector.h"

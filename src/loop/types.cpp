@@ -1,0 +1,1 @@
+#include "loopd/report.h"
