@@ -40,6 +40,11 @@ class Detector {
   /// in the image; a failure inside becomes Outcome::kError and leaves the map as it was.
   void process(const Frame& frame, Report& report);
 
+  /// The same for an image described elsewhere (streamed or recorded features). Precondition: as
+  /// many descriptors as points and as lines.
+  void process(const Features& features, std::uint64_t sequence,
+               std::optional<std::int64_t> time_ns, Report& report);
+
   /// Brings the vocabularies up to date after process() of the same frame: the image that leaves
   /// the waiting window becomes searchable. Fills update_ns, words and bytes of `report`.
   void absorb(Report& report);

@@ -1,1 +1,260 @@
 #include "loopd/detector.h"
+
+#include <algorithm>
+#include <cassert>
+#include <chrono>
+#include <exception>
+#include <utility>
+
+#include "features/feature_extractor.h"
+#include "index/vocabulary.h"
+#include "loop/fusion.h"
+#include "loop/islands.h"
+#include "loop/map.h"
+#include "loop/stillness.h"
+#include "verify/verifier.h"
+
+namespace loopd {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+
+// Adds the time of its scope to a stage.
+class StageTimer {
+ public:
+  explicit StageTimer(std::int64_t& stage_ns) : stage_ns_(stage_ns), start_(SteadyClock::now()) {}
+  ~StageTimer() {
+    stage_ns_ +=
+        std::chrono::duration_cast<std::chrono::nanoseconds>(SteadyClock::now() - start_).count();
+  }
+  StageTimer(const StageTimer&) = delete;
+  StageTimer& operator=(const StageTimer&) = delete;
+
+ private:
+  std::int64_t& stage_ns_;
+  SteadyClock::time_point start_;
+};
+
+class InlineLanes : public LaneExecutor {
+ public:
+  void run(const std::function<void()>& points, const std::function<void()>& lines) override {
+    points();
+    lines();
+  }
+};
+
+template <std::size_t N>
+void copy_head(const std::vector<Candidate>& from, FixedVector<Candidate, N>& to) {
+  for (const Candidate& c : from)
+    if (!to.push_back(c)) return;
+}
+
+// A copy that holds no spare capacity: it stays for the life of the map.
+Features compact(const Features& features) {
+  Features copy = features;
+  copy.points.shrink_to_fit();
+  copy.point_descriptors.shrink_to_fit();
+  copy.lines.shrink_to_fit();
+  copy.line_descriptors.shrink_to_fit();
+  return copy;
+}
+
+}  // namespace
+
+class Detector::Impl {
+ public:
+  Impl(const Config& config, LaneExecutor* lanes)
+      : config_(config),
+        lanes_(lanes != nullptr ? *lanes : inline_lanes_),
+        extractor_(config.features),
+        point_words_(config.index),
+        line_words_(config.index),
+        verifier_(config.verify),
+        stillness_(config.loop),
+        map_(config.loop) {
+    assert(validate(config).empty());
+  }
+
+  // `describe` fills features_; all that follows is the same wherever they come from.
+  template <class Describe>
+  void process(std::uint64_t sequence, std::optional<std::int64_t> time_ns, Report& report,
+               const Describe& describe) {
+    report.clear();
+    report.query = next_id_++;
+    report.sequence = sequence;
+    report.time_ns = time_ns;
+    pending_ = false;
+    const StageTimer total(report.times.total_ns);
+    try {
+      describe();
+      report.outcome = decide(report);
+    } catch (const std::exception&) {
+      report.outcome = Outcome::kError;
+      report.match.reset();
+      report.verification.reset();
+      report.pairs.clear();
+    }
+    priority_ = report.outcome == Outcome::kLoop ? report.island : std::nullopt;
+  }
+
+  void process(const Frame& frame, Report& report) {
+    process(frame.sequence, frame.time_ns, report, [&] {
+      const StageTimer timer(report.times.features_ns);
+      describe(frame.view());
+    });
+  }
+
+  void process(const Features& features, std::uint64_t sequence,
+               std::optional<std::int64_t> time_ns, Report& report) {
+    process(sequence, time_ns, report, [&] { features_ = features; });
+  }
+
+  void absorb(Report& report) {
+    const StageTimer total(report.times.total_ns);
+    const StageTimer update(report.times.update_ns);
+    try {
+      if (std::exchange(pending_, false)) keep(report);
+      admit_ready();
+    } catch (const std::exception&) {
+      report.outcome = report.outcome == Outcome::kLoop ? Outcome::kLoop : Outcome::kError;
+    }
+    report.words_points = point_words_.words();
+    report.words_lines = line_words_.words();
+    report.images = map_.searchable();
+    report.bytes = bytes();
+  }
+
+  const Features* features(ImageId image) const {
+    if (next_id_ > 0 && image == next_id_ - 1) return &features_;
+    const MapImage* kept = map_.find(image);
+    return kept != nullptr ? &kept->features : nullptr;
+  }
+
+  std::size_t bytes() const {
+    return map_.bytes() + point_words_.bytes() + line_words_.bytes() + features_.bytes();
+  }
+
+ private:
+  // 1
+  void describe(const LumaView& image) {
+    extractor_.prepare(image, features_);
+    lanes_.run([this] { extractor_.extract_points(features_); },
+               [this] { extractor_.extract_lines(features_); });
+  }
+
+  // The method, a step a line (numbers as in DESIGN section 3; 1 came before, 8 follows in absorb).
+  Outcome decide(Report& report) {
+    report.points = static_cast<int>(features_.points.size());
+    report.lines = static_cast<int>(features_.lines.size());
+    if (report.points + report.lines < config_.features.min_features) return Outcome::kNoFeatures;
+    notice_motion(report);
+    if (map_.searchable() == 0) return Outcome::kMapEmpty;
+    search(report);                                                // 2
+    normalise(report);                                             // 3
+    fuse(points_, lines_, config_.loop.one_list_penalty, fused_);  // 4
+    copy_head(fused_, report.fused);
+    report.island = choose_island();  // 5
+    if (!report.island) return Outcome::kNoCandidates;
+    return verify(report);  // 6, 7
+  }
+
+  // A frame that shows what the last kept image shows adds nothing, and time does not pass for the
+  // waiting window: a parked robot closes no loop with itself.
+  void notice_motion(Report& report) {
+    const MapImage* newest = map_.newest();
+    report.still = newest != nullptr && stillness_.is_still(newest->features, features_);
+    if (!report.still && report.time_ns && last_time_ns_ && *report.time_ns > *last_time_ns_)
+      moving_ns_ += *report.time_ns - *last_time_ns_;
+    last_time_ns_ = report.time_ns;
+    pending_ = !report.still;
+  }
+
+  void search(Report& report) {
+    const StageTimer timer(report.times.search_ns);
+    lanes_.run([this] { point_words_.search(features_.point_descriptors, points_); },
+               [this] { line_words_.search(features_.line_descriptors, lines_); });
+  }
+
+  void normalise(Report& report) {
+    const auto longest = static_cast<std::size_t>(config_.loop.max_candidates);
+    normalise_scores(points_, config_.loop.min_similarity, longest);
+    normalise_scores(lines_, config_.loop.min_similarity, longest);
+    copy_head(points_, report.point_candidates);
+    copy_head(lines_, report.line_candidates);
+  }
+
+  std::optional<Island> choose_island() {
+    placed_.clear();
+    for (const Candidate& c : fused_) placed_.push_back({c.image, map_.position(c.image), c.score});
+    const auto gap = static_cast<std::uint32_t>(config_.loop.island_gap);
+    return select_island(build_islands(placed_, gap), priority_);
+  }
+
+  Outcome verify(Report& report) {
+    const StageTimer timer(report.times.verify_ns);
+    const MapImage& candidate = *map_.find(report.island->best);
+    const auto fused = std::find_if(fused_.begin(), fused_.end(),
+                                    [&](const Candidate& c) { return c.image == candidate.id; });
+    report.match = Match{candidate.id, candidate.sequence, candidate.time_ns, fused->score};
+    report.verification =
+        verifier_.verify(features_, candidate.features, seed_of(report.query), report.pairs);
+    if (report.verification->matches() < config_.verify.min_inliers) return Outcome::kFewMatches;
+    if (report.verification->inliers() < config_.verify.min_inliers) return Outcome::kFewInliers;
+    return Outcome::kLoop;
+  }
+
+  std::uint64_t seed_of(ImageId query) const {
+    return (static_cast<std::uint64_t>(config_.verify.seed) << 32U) + query;
+  }
+
+  void keep(const Report& report) {
+    map_.push({report.query, report.sequence, report.time_ns, moving_ns_, compact(features_)});
+  }
+
+  // 8. At most two images a frame, so that a frame's time stays bounded after a pause.
+  void admit_ready() {
+    for (int i = 0; i < 2; ++i) {
+      const MapImage* image = map_.ready(moving_ns_);
+      if (image == nullptr) return;
+      lanes_.run([&] { point_words_.add(image->id, image->features.point_descriptors); },
+                 [&] { line_words_.add(image->id, image->features.line_descriptors); });
+      map_.admit();
+    }
+  }
+
+  Config config_;
+  InlineLanes inline_lanes_;
+  LaneExecutor& lanes_;
+  FeatureExtractor extractor_;
+  Vocabulary point_words_;
+  Vocabulary line_words_;
+  Verifier verifier_;
+  StillnessTest stillness_;
+  ImageMap map_;
+
+  ImageId next_id_ = 0;
+  Features features_;     // of the newest frame
+  bool pending_ = false;  // the newest frame waits for absorb() to keep it
+  std::optional<std::int64_t> last_time_ns_;
+  std::int64_t moving_ns_ = 0;
+  std::optional<Island> priority_;
+  std::vector<Candidate> points_;
+  std::vector<Candidate> lines_;
+  std::vector<Candidate> fused_;
+  std::vector<PlacedCandidate> placed_;
+};
+
+Detector::Detector(const Config& config, LaneExecutor* lanes)
+    : impl_(std::make_unique<Impl>(config, lanes)) {}
+Detector::~Detector() = default;
+
+void Detector::process(const Frame& frame, Report& report) { impl_->process(frame, report); }
+void Detector::process(const Features& features, std::uint64_t sequence,
+                       std::optional<std::int64_t> time_ns, Report& report) {
+  impl_->process(features, sequence, time_ns, report);
+}
+void Detector::absorb(Report& report) { impl_->absorb(report); }
+const Features* Detector::features(ImageId image) const { return impl_->features(image); }
+std::size_t Detector::bytes() const { return impl_->bytes(); }
+
+}  // namespace loopd

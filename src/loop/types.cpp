@@ -5,24 +5,36 @@ namespace loopd {
 
 std::string_view outcome_name(Outcome outcome) {
   switch (outcome) {
-    case Outcome::kLoop: return "loop";
-    case Outcome::kNoFeatures: return "no_features";
-    case Outcome::kMapEmpty: return "map_empty";
-    case Outcome::kNoCandidates: return "no_candidates";
-    case Outcome::kFewMatches: return "few_matches";
-    case Outcome::kFewInliers: return "few_inliers";
-    case Outcome::kNotDistinctive: return "not_distinctive";
-    case Outcome::kNotConfirmed: return "not_confirmed";
-    case Outcome::kError: return "error";
+    case Outcome::kLoop:
+      return "loop";
+    case Outcome::kNoFeatures:
+      return "no_features";
+    case Outcome::kMapEmpty:
+      return "map_empty";
+    case Outcome::kNoCandidates:
+      return "no_candidates";
+    case Outcome::kFewMatches:
+      return "few_matches";
+    case Outcome::kFewInliers:
+      return "few_inliers";
+    case Outcome::kNotDistinctive:
+      return "not_distinctive";
+    case Outcome::kNotConfirmed:
+      return "not_confirmed";
+    case Outcome::kError:
+      return "error";
   }
   return "unknown";
 }
 
 std::string_view model_name(Model model) {
   switch (model) {
-    case Model::kFundamental: return "fundamental";
-    case Model::kHomography: return "homography";
-    case Model::kRotation: return "rotation";
+    case Model::kFundamental:
+      return "fundamental";
+    case Model::kHomography:
+      return "homography";
+    case Model::kRotation:
+      return "rotation";
   }
   return "unknown";
 }

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "loopd/report.h"
+
+namespace loopd {
+
+/// A candidate with its position among the searchable images (eviction leaves no holes there).
+struct PlacedCandidate {
+  ImageId image = 0;
+  std::uint32_t position = 0;
+  double score = 0;
+};
+
+/// Groups candidates (best first) into islands: the best ungrouped candidate seeds an island, and
+/// every candidate joins the seed nearest to it, if that is within `gap` positions (ties: the
+/// better seed). Thus islands never overlap and an island holds at most 2 * gap + 1 images.
+/// Eq. 4: score = sum of the images' scores / (n - m + 1), positions m..n inclusive; those not
+/// retrieved count 0. Best island first, ties by older image.
+std::vector<Island> build_islands(std::span<const PlacedCandidate> candidates, std::uint32_t gap);
+
+/// The island to verify: the best of those that overlap `priority` (the island of the previous
+/// image, if its loop was verified), else the best of all. None if there are no islands.
+std::optional<Island> select_island(std::span<const Island> islands,
+                                    const std::optional<Island>& priority);
+
+}  // namespace loopd
