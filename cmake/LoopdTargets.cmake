@@ -15,7 +15,8 @@ set(CMAKE_CXX_FLAGS_RELEASE "-O3")
 # no -march=native).
 add_library(loopd_flags INTERFACE)
 target_compile_options(loopd_flags INTERFACE
-  -Wall -Wextra -Wconversion -Wshadow -Werror -ffp-contract=off)
+  -Wall -Wextra -Wconversion -Wshadow -Werror -ffp-contract=off
+  -Wno-restrict)  # g++ 12 warns falsely about std::string operator+ (GCC bug 105651)
 target_include_directories(loopd_flags INTERFACE ${CMAKE_SOURCE_DIR}/include)
 
 # loopd_library(NAME SOURCES... LINKS public libs...): the library of one folder of src/.
