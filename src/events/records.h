@@ -168,6 +168,9 @@ std::string state_text(const StateRecord& record, StreamPosition position, bool 
 std::string stats_text(const StatsRecord& record, const ServerStats& server,
                        StreamPosition position, bool repeat);
 
+/// A client's `watch` request, the inverse of parse_request().
+std::string request_text(const WatchRequest& request);
+
 /// Reads one line of a client, without its newline. Any bytes are answered: nesting is bounded
 /// before the parser runs.
 ParsedRequest parse_request(std::string_view line);

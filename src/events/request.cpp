@@ -1,0 +1,147 @@
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "events/json_text.h"
+#include "events/records.h"
+
+namespace loopd {
+
+namespace {
+
+using json_text::Json;
+
+constexpr std::array<std::string_view, kRecordClasses> kClassNames = {"loop", "candidate", "state",
+                                                                      "stats"};
+constexpr std::string_view kKnownClasses = "loop, candidate, state, stats";
+/// A request needs three levels; a parser that is handed more is being tested.
+constexpr int kMaxDepth = 16;
+constexpr std::size_t kMaxQuotedBytes = 40;
+
+ParsedRequest refuse(std::string why) { return {std::nullopt, std::move(why)}; }
+
+std::string quote(const std::string& text) {
+  std::string quoted("\"");
+  quoted.append(text, 0, kMaxQuotedBytes);
+  quoted += text.size() > kMaxQuotedBytes ? "...\"" : "\"";
+  return quoted;
+}
+
+/// Deepest nesting of brackets outside strings.
+int nesting_depth(std::string_view text) {
+  int depth = 0, deepest = 0;
+  bool in_string = false;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (in_string) {
+      if (c == '\\') ++i;
+      if (c == '"') in_string = false;
+      continue;
+    }
+    if (c == '"') in_string = true;
+    if (c == '[' || c == '{') deepest = std::max(deepest, ++depth);
+    if (c == ']' || c == '}') --depth;
+  }
+  return deepest;
+}
+
+/// The violated rule, or empty with `classes` filled.
+std::string read_classes(const Json& json, ClassSet& classes) {
+  if (!json.is_array()) return "\"classes\" must be an array of class names";
+  classes = ClassSet();
+  for (const Json& item : json) {
+    if (!item.is_string()) return "\"classes\" must be an array of class names";
+    const std::string& name = item.get_ref<const std::string&>();
+    const std::optional<RecordClass> record_class = record_class_from_name(name);
+    if (!record_class) {
+      return "unknown class " + quote(name) + "; known are: " + std::string(kKnownClasses);
+    }
+    classes.add(*record_class);
+  }
+  return {};
+}
+
+std::string read_since(const Json& json, std::optional<Since>& since) {
+  constexpr const char* kRule = "\"since\" must be {\"epoch\": text, \"seq\": whole number >= 0}";
+  if (!json.is_object()) return kRule;
+  const auto epoch = json.find("epoch");
+  const auto seq = json.find("seq");
+  if (epoch == json.end() || !epoch->is_string()) return kRule;
+  if (seq == json.end() || !seq->is_number_unsigned()) return kRule;
+  since = Since{epoch->get<std::string>(), seq->get<std::uint64_t>()};
+  return {};
+}
+
+std::string read_pairs(const Json& json, bool& pairs) {
+  if (!json.is_boolean()) return "\"pairs\" must be true or false";
+  pairs = json.get<bool>();
+  return {};
+}
+
+ParsedRequest read_watch(const Json& json) {
+  WatchRequest request;
+  std::string error;
+  if (const auto it = json.find("classes"); it != json.end()) {
+    error = read_classes(*it, request.classes);
+  }
+  if (const auto it = json.find("pairs"); error.empty() && it != json.end()) {
+    error = read_pairs(*it, request.pairs);
+  }
+  if (const auto it = json.find("since"); error.empty() && it != json.end()) {
+    error = read_since(*it, request.since);
+  }
+  if (!error.empty()) return refuse(std::move(error));
+  return {std::move(request), {}};
+}
+
+ParsedRequest read_request(const Json& json) {
+  if (!json.is_object()) return refuse("a request must be an object like {\"op\":\"watch\"}");
+  const auto op = json.find("op");
+  if (op == json.end() || !op->is_string()) {
+    return refuse("a request must name its \"op\", like {\"op\":\"watch\"}");
+  }
+  const std::string& name = op->get_ref<const std::string&>();
+  if (name != "watch") return refuse("unknown op " + quote(name) + "; known is: watch");
+  return read_watch(json);
+}
+
+}  // namespace
+
+std::string_view record_class_name(RecordClass record_class) {
+  return kClassNames[static_cast<std::size_t>(record_class)];
+}
+
+std::optional<RecordClass> record_class_from_name(std::string_view name) {
+  const auto it = std::find(kClassNames.begin(), kClassNames.end(), name);
+  if (it == kClassNames.end()) return std::nullopt;
+  return static_cast<RecordClass>(it - kClassNames.begin());
+}
+
+std::string request_text(const WatchRequest& request) {
+  Json json{{"op", "watch"}};
+  json["classes"] = Json::array();
+  for (std::string_view name : kClassNames) {
+    if (request.classes.has(*record_class_from_name(name))) json["classes"].push_back(name);
+  }
+  json["pairs"] = request.pairs;
+  if (request.since) {
+    json["since"] = {{"epoch", request.since->epoch}, {"seq", request.since->seq}};
+  }
+  return json_text::dump(json);
+}
+
+ParsedRequest parse_request(std::string_view line) {
+  if (nesting_depth(line) > kMaxDepth) {
+    return refuse("not a request: nested deeper than " + std::to_string(kMaxDepth) + " levels");
+  }
+  try {
+    return read_request(Json::parse(line));
+  } catch (const Json::parse_error& error) {
+    return refuse("not JSON: the mistake is near byte " + std::to_string(error.byte) +
+                  " of the line");
+  } catch (const Json::exception&) {  // a number beyond double
+    return refuse("not JSON: a number is out of range");
+  }
+}
+
+}  // namespace loopd
