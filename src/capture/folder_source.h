@@ -1,0 +1,24 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "base/result.h"
+#include "capture/frame_source.h"
+
+namespace loopd {
+
+/// What a FrameSource is made from.
+struct SourceOptions {
+  std::string path;
+  bool loop = false;
+  double nominal_fps = 0;      ///< for times where no other is known; 0 = none
+  std::size_t max_pixels = 0;  ///< of one frame
+};
+
+/// Opens a folder of images, or the `images/` in it, or one image file as a source.
+/// Errors: it cannot be listed, holds no image or more than a million, or `times.txt` is bad.
+Result<std::unique_ptr<FrameSource>> open_folder_source(const SourceOptions& options);
+
+}  // namespace loopd

@@ -1,1 +1,0 @@
-#include "loopd/frame.h"
