@@ -45,6 +45,8 @@ struct VerifyConfig {
   double line_ratio = 0.9;
   int max_line_distance = 80;
   double max_line_angle_deg = 20.0;
+  int line_neighbours = 8;
+  bool line_angle_filter = true;
   double epipolar_px = 2.0;
   int max_iterations = 1000;
   int min_inliers = 20;
