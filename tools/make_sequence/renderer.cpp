@@ -264,7 +264,7 @@ Renderer::Footprint Renderer::footprint(const Ray& ray, double depth, int axis) 
 }
 
 double Renderer::light_at(const Vec3& p) const {
-  return 0.42 + 0.48 * scene_.light_maps[lap_].read(p.x, p.y);
+  return 0.5 + 0.55 * scene_.light_maps[lap_].read(p.x, p.y);
 }
 
 /// Noise at (u, v) metres for a footprint of half size `size`, fading as blotches become small.
@@ -364,7 +364,7 @@ double Renderer::shade_floor(const Vec3& p, const Footprint& f) const {
 
 double Renderer::shade_ceiling(const Vec3& p, const Footprint& f) const {
   const double seam = 1 - (1 - seams(p.x, f.x, kTileM, 0.02)) * (1 - seams(p.y, f.y, kTileM, 0.02));
-  double value = blend(205, 150, seam) * (0.55 + 0.4 * light_at(p));
+  double value = blend(205, 150, seam) * (0.52 + 0.36 * light_at(p));
   const int c = static_cast<int>((p.x - lamp_x0_) / kLampCellM);
   const int r = static_cast<int>((p.y - lamp_y0_) / kLampCellM);
   if (c < 0 || r < 0 || c >= lamp_columns_ || r >= lamp_rows_) return value;
