@@ -59,7 +59,7 @@ void append_points(const Features& query, const Features& candidate,
     const Point& c = candidate.points[matches[i].candidate];
     const Place place{q.x_px, q.y_px, c.x_px, c.y_px};
     const double size = std::max(q.size_px, c.size_px);
-    if (!place.finite() || !std::isfinite(size)) continue;
+    if (!place.finite() || !std::isfinite(q.size_px) || !std::isfinite(c.size_px)) continue;
     append(place, tolerance_px * tolerance_factor(size / kPatchPx), out);
     out.point_match.push_back(static_cast<std::uint32_t>(i));
   }

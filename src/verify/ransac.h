@@ -66,7 +66,7 @@ class Ransac {
   static constexpr double kMissProbability = 1e-4;
   static constexpr int kOptimisationSteps = 4;
   /// Residuals to compute at most: bounds the time of a hopeless candidate with many matches.
-  static constexpr std::size_t kMaxResiduals = 1'000'000;
+  static constexpr std::size_t kMaxResiduals = 600'000;
 
   Ransac(const Correspondences& c, RansacScratch& scratch)
       : c_(c), sampler_(c), residuals_(scratch.residuals), weights_(scratch.weights) {
