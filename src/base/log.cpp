@@ -1,5 +1,6 @@
 #include "base/log.h"
 
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -80,6 +81,8 @@ void Log::write(LogLevel level, std::string_view message,
     append_value(line, value);
   }
   line += '\n';
+  pollfd ready{fd_, POLLOUT, 0};  // a pipe that polls writable takes a line without blocking
+  if (poll(&ready, 1, 0) == 0) return;
   [[maybe_unused]] const ssize_t written = ::write(fd_, line.data(), line.size());
 }
 

@@ -1,0 +1,86 @@
+#include "app/capture_loop.h"
+
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "base/clock.h"
+
+namespace loopd {
+namespace {
+
+/// One bad frame after another fills no log: each kind of fault is logged this often at most.
+constexpr std::int64_t kLogInterval_ns = 10'000'000'000;
+
+State state_of(const CameraError& error) {
+  return error.fault == CameraFault::kStalled ? State::kCameraStalled : State::kCameraLost;
+}
+
+std::string remedy_for(CameraFault fault) {
+  switch (fault) {
+    case CameraFault::kNoDevice:
+    case CameraFault::kUnplugged:
+      return "plug the camera in; loopd goes on by itself";
+    case CameraFault::kPermission:
+      return "give the service's user access to the device";
+    case CameraFault::kStalled:
+      return "check cable and light; loopd goes on by itself";
+    default:
+      return "";
+  }
+}
+
+}  // namespace
+
+void CaptureLoop::run() {
+  while (std::visit([this](auto&& event) { return handle(std::move(event)); }, camera_.next())) {
+  }
+  mailbox_.close();
+}
+
+bool CaptureLoop::handle(Frame frame) {
+  counters_.frames.fetch_add(1, std::memory_order_relaxed);
+  if (state_ != State::kRunning && state_ != State::kCameraBack) {
+    state_ = state_.has_value() ? State::kCameraBack : State::kRunning;
+    counters_.away = false;
+    tell({LogLevel::kNotice, {*state_, monotonic_now_ns(), "frames arrive", ""}});
+  }
+  return lock_step_ ? mailbox_.put_when_empty(std::move(frame)) : mailbox_.put(std::move(frame));
+}
+
+bool CaptureLoop::handle(const CameraError& error) {
+  if (error.lost || error.fault == CameraFault::kStalled)
+    camera_away(error);
+  else
+    frame_lost(error);
+  return true;
+}
+
+bool CaptureLoop::handle(EndOfStream) {
+  counters_.away = true;
+  counters_.ended = true;  // told by the detect thread once it has worked on the last frame
+  return false;
+}
+
+void CaptureLoop::camera_away(const CameraError& error) {
+  if (state_ == state_of(error)) return;
+  state_ = state_of(error);
+  counters_.away = true;
+  tell({LogLevel::kWarning, {*state_, monotonic_now_ns(), error.message, remedy_for(error.fault)}});
+}
+
+void CaptureLoop::frame_lost(const CameraError& error) {
+  counters_.corrupt.fetch_add(1, std::memory_order_relaxed);
+  std::optional<std::int64_t>& told_ns = told_ns_.at(static_cast<std::size_t>(error.fault));
+  const std::int64_t now_ns = monotonic_now_ns();
+  if (told_ns && now_ns - *told_ns < kLogInterval_ns) return;
+  told_ns = now_ns;
+  tell({LogLevel::kWarning, {State::kRunning, now_ns, error.message, ""}, false});
+}
+
+void CaptureLoop::tell(const Notice& notice) {
+  notices_.give(notice);
+  wakeup_.wake();
+}
+
+}  // namespace loopd

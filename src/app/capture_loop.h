@@ -1,0 +1,63 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "app/notices.h"
+#include "app/wakeup.h"
+#include "base/mailbox.h"
+#include "capture/camera.h"
+
+namespace loopd {
+
+/// What the capture thread counts. Thread-safe.
+struct CaptureCounters {
+  std::atomic<std::uint64_t> frames = 0;   ///< delivered by the camera
+  std::atomic<std::uint64_t> corrupt = 0;  ///< errors that cost one frame
+  std::atomic<bool> away = false;          ///< the camera is known to be lost, stalled or ended
+  std::atomic<bool> ended = false;         ///< a recording came to its end
+};
+
+/// The capture thread's work: moves frames from the camera to the mailbox, and tells what happens
+/// to the camera. A lost camera is not an end: the camera itself keeps trying to come back.
+/// Thread: run() is the body of the capture thread; it returns after Camera::interrupt(), the end
+/// of a recording, or the mailbox's close.
+class CaptureLoop {
+ public:
+  /// `lock_step`: wait until the detector has taken each frame. All arguments outlive the loop.
+  CaptureLoop(Camera& camera, Mailbox<Frame>& mailbox, NoticeQueue& notices, const Wakeup& wakeup,
+              CaptureCounters& counters, bool lock_step)
+      : camera_(camera),
+        mailbox_(mailbox),
+        notices_(notices),
+        wakeup_(wakeup),
+        counters_(counters),
+        lock_step_(lock_step) {}
+
+  void run();
+
+ private:
+  static constexpr std::size_t kFaults = static_cast<std::size_t>(CameraFault::kStreamError) + 1;
+
+  bool handle(Frame frame);
+  bool handle(const CameraError& error);
+  bool handle(EndOfStream);
+  bool handle(Interrupted) { return false; }
+  void camera_away(const CameraError& error);
+  void frame_lost(const CameraError& error);
+  void tell(const Notice& notice);
+
+  Camera& camera_;
+  Mailbox<Frame>& mailbox_;
+  NoticeQueue& notices_;
+  const Wakeup& wakeup_;
+  CaptureCounters& counters_;
+  const bool lock_step_;
+  std::optional<State> state_;                                  ///< the last one told
+  std::array<std::optional<std::int64_t>, kFaults> told_ns_{};  ///< when each fault was last logged
+};
+
+}  // namespace loopd

@@ -1,0 +1,23 @@
+#include "app/liveness.h"
+
+#include <algorithm>
+
+#include "app/detect_loop.h"
+
+namespace loopd {
+
+bool Liveness::alive(const Vitals& vitals, std::int64_t now_ns) {
+  const bool idle_for_a_reason = vitals.camera_away && !vitals.work_pending;
+  if (vitals.frames_detected != frames_seen_ || idle_for_a_reason) advanced_ns_ = now_ns;
+  frames_seen_ = vitals.frames_detected;
+  if (vitals.errors_in_row >= DetectLoop::kMostErrorsInRow) return false;
+  return now_ns - advanced_ns_ <= patience_ns_;
+}
+
+std::int64_t patience_for(double fps, std::uint64_t watchdog_us) {
+  const auto half_ns = static_cast<std::int64_t>(watchdog_us) * 500;
+  if (fps <= 0) return half_ns;
+  return std::max(half_ns, static_cast<std::int64_t>(5e9 / fps));
+}
+
+}  // namespace loopd
