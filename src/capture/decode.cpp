@@ -59,42 +59,55 @@ std::optional<ImageFormat> image_format(std::span<const std::uint8_t> bytes) {
 
 class ImageDecoder::Jpeg {
  public:
-  Jpeg() : handle_(tjInitDecompress()) {
-    if (handle_ == nullptr) throw std::bad_alloc();
-  }
-  ~Jpeg() { tjDestroy(handle_); }
-  Jpeg(const Jpeg&) = delete;
-  Jpeg& operator=(const Jpeg&) = delete;
+  Jpeg() : handle_(open()) {}
 
   Result<ImageSize> size(std::span<const std::uint8_t> bytes) {
     int width = 0;
     int height = 0;
     int subsampling = 0;
     int colorspace = 0;
-    if (tjDecompressHeader3(handle_, bytes.data(), bytes.size(), &width, &height, &subsampling,
-                            &colorspace) != 0 &&
-        tjGetErrorCode(handle_) != TJERR_WARNING)
-      return damaged("the JPEG header is damaged (" + reason() + ")");
+    // A warning is no reason to stop here; a header of tables alone succeeds and leaves 0x0.
+    tjDecompressHeader3(handle_.get(), bytes.data(), bytes.size(), &width, &height, &subsampling,
+                        &colorspace);
+    if (width < 1 || height < 1) return damaged("the JPEG header is damaged" + fail());
     if (colorspace == TJCS_CMYK || colorspace == TJCS_YCCK)
       return unsupported("it is a CMYK JPEG; convert it to grey or RGB");
-    return checked_size(static_cast<std::uint64_t>(std::max(width, 0)),
-                        static_cast<std::uint64_t>(std::max(height, 0)));
+    return checked_size(static_cast<std::uint64_t>(width), static_cast<std::uint64_t>(height));
   }
 
   Status decode(std::span<const std::uint8_t> bytes, const ImageSize& size,
                 std::span<std::uint8_t> luma) {
     // TJFLAG_LIMITSCANS: a small progressive file may otherwise ask for hours of work.
-    if (tjDecompress2(handle_, bytes.data(), bytes.size(), luma.data(), size.width_px,
+    if (tjDecompress2(handle_.get(), bytes.data(), bytes.size(), luma.data(), size.width_px,
                       size.width_px, size.height_px, TJPF_GRAY, TJFLAG_LIMITSCANS) == 0)
       return Nothing{};
-    if (tjGetErrorCode(handle_) == TJERR_WARNING && harmless(reason(), bytes)) return Nothing{};
-    return damaged("the JPEG data is damaged or ends early (" + reason() + ")");
+    if (tjGetErrorCode(handle_.get()) == TJERR_WARNING &&
+        harmless(tjGetErrorStr2(handle_.get()), bytes))
+      return Nothing{};
+    return damaged("the JPEG data is damaged or ends early" + fail());
   }
 
  private:
-  std::string reason() { return tjGetErrorStr2(handle_); }
+  struct Close {
+    void operator()(void* handle) const { tjDestroy(handle); }
+  };
+  using Handle = std::unique_ptr<void, Close>;
 
-  tjhandle handle_;
+  static Handle open() {
+    Handle handle(tjInitDecompress());
+    if (handle == nullptr) throw std::bad_alloc();
+    return handle;
+  }
+
+  // The library's reason. Starts afresh: after some errors, TurboJPEG 2.1 is left in the middle of
+  // the damaged file and gives no size for the next, good one.
+  std::string fail() {
+    std::string reason = " (" + std::string(tjGetErrorStr2(handle_.get())) + ")";
+    handle_ = open();
+    return reason;
+  }
+
+  Handle handle_;
 };
 
 ImageDecoder::ImageDecoder(std::size_t max_pixels)

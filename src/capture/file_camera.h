@@ -14,7 +14,7 @@ struct FileCameraOptions {
   /// A folder of images; a dataset folder (then its `images/` is used); one image; or a video.
   /// In a folder every *.jpg, *.jpeg, *.png, *.pgm, *.ppm and *.pnm (any case) is a frame, sorted
   /// by name byte by byte; other names are ignored. What is in a file is decided by its content.
-  std::string path;
+  std::string path = {};
 
   /// Frames per second in real time; 0 = as fast as possible, lock-step: next() waits for a free
   /// buffer and nothing is dropped. In real time each frame has an absolute deadline, so that the
@@ -34,11 +34,11 @@ struct FileCameraOptions {
 
   /// Scripted faults, separated by spaces or commas; see fault_script.h for the grammar.
   /// Example: "stall@100:2s drop@50:3 corrupt@70 unplug@200:5s jump@300:+3600s".
-  std::string faults;
+  std::string faults = {};
 
   /// Program that turns a video into frames; empty = `loopd-video` beside this executable, else in
   /// the installed libexec folder, else in PATH.
-  std::string video_decoder;
+  std::string video_decoder = {};
 };
 
 /// Opens a folder of images, one image, or a video file as a camera.
