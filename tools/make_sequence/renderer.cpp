@@ -198,7 +198,7 @@ void Renderer::sort_into_bins() {
   for (std::size_t i = 0; i < bins_.size(); ++i) {
     auto& bin = bins_[i];
     const double far = bin_far_[i];
-    std::erase_if(bin, [far](const Item& item) { return item.near_depth > far + 1; });
+    std::erase_if(bin, [far](const Item& item) { return item.near_depth > far; });
     std::sort(bin.begin(), bin.end(),
               [](const Item& a, const Item& b) { return a.index < b.index; });
     const auto same = [](const Item& a, const Item& b) { return a.index == b.index; };
@@ -439,11 +439,13 @@ void Renderer::render(const Pose& pose, int lap, Radiance& out) {
       static_cast<std::size_t>(camera_.width_px) * static_cast<std::size_t>(camera_.height_px);
   out.resize(pixels);
   surfaces_.resize(pixels);
+  depths_.resize(pixels);
   for (std::size_t i = 0, y = 0; y < static_cast<std::size_t>(camera_.height_px); ++y) {
     for (std::size_t x = 0; x < static_cast<std::size_t>(camera_.width_px); ++x, ++i) {
       const Ray ray = make_ray(static_cast<double>(x), static_cast<double>(y), 1);
       const Hit hit = cast(ray.direction);
       surfaces_[i] = hit.surface;
+      depths_[i] = static_cast<float>(hit.depth);
       out[i] = static_cast<float>(shade(ray, hit));
     }
   }

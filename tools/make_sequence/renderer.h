@@ -26,6 +26,9 @@ class Renderer {
   /// Precondition: pitch and roll of `pose` within 5 degrees of level, position in the corridor.
   void render(const Pose& pose, int lap, Radiance& out);
 
+  /// Of the image rendered last: each pixel's distance along the optical axis, metres.
+  const std::vector<float>& depths_m() const { return depths_; }
+
  private:
   /// A ray in the world, unnormalised (depth 1 along the optical axis), and its derivative.
   struct Ray {
@@ -91,6 +94,7 @@ class Renderer {
   std::vector<std::vector<Item>> bins_;
   std::vector<double> bin_far_;
   std::vector<int> surfaces_;  // of each pixel's ray
+  std::vector<float> depths_;
 };
 
 }  // namespace loopd::sequence
