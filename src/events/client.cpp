@@ -48,7 +48,9 @@ Result<EventClient> EventClient::connect(const std::string& socket_path,
 }
 
 Status EventClient::watch(const WatchRequest& request) {
-  return send(request_text(request) + "\n");
+  Status sent = send(request_text(request) + "\n");
+  if (!sent && sent.error().code == EPIPE) return Nothing();
+  return sent;
 }
 
 Status EventClient::send(std::string_view bytes) {

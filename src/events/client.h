@@ -22,7 +22,8 @@ class EventClient {
   static Result<EventClient> connect(const std::string& socket_path,
                                      std::size_t max_record_bytes = kMaxRecordBytes);
 
-  /// Asks for records; the answer, a `watch` or an `error` record, comes by next().
+  /// Asks for records; the answer, a `watch` or an `error` record, comes by next(). So does the
+  /// reason if the daemon has closed the connection already ("too many clients").
   Status watch(const WatchRequest& request);
   /// Sends `bytes` as they are. Blocks while the daemon does not read, at most a second.
   Status send(std::string_view bytes);

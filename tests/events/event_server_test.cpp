@@ -1,6 +1,8 @@
 #include "events/event_server.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 #include <filesystem>
 
@@ -151,6 +153,40 @@ TEST_F(EventServerTest, ServesSixtyFourAndTurnsTheNextAway) {
   clients.pop_back();
   ASSERT_TRUE(loop_.run_until([&] { return server_->clients() == 63; }));
   EXPECT_TRUE(connect()->wait_for("hello"));
+}
+
+/// While it lives this process can open no more descriptors.
+class NoMoreDescriptors {
+ public:
+  NoMoreDescriptors() {
+    getrlimit(RLIMIT_NOFILE, &before_);
+    const UniqueFd lowest_free(open("/dev/null", O_RDONLY | O_CLOEXEC));
+    rlimit now = before_;
+    now.rlim_cur = static_cast<rlim_t>(lowest_free.get());
+    EXPECT_EQ(setrlimit(RLIMIT_NOFILE, &now), 0);
+  }
+  ~NoMoreDescriptors() { setrlimit(RLIMIT_NOFILE, &before_); }
+  NoMoreDescriptors(const NoMoreDescriptors&) = delete;
+  NoMoreDescriptors& operator=(const NoMoreDescriptors&) = delete;
+
+ private:
+  rlimit before_{};
+};
+
+TEST_F(EventServerTest, OutOfDescriptorsItNeitherSpinsNorGivesUp) {
+  start();
+  const auto watcher = connect_and_watch("\"loop\"");
+  TestClient waiting(loop_, options_.socket_path);
+  {
+    const NoMoreDescriptors none;
+    int busy = 0;
+    while (busy < 100 && sd_event_run(loop_.get(), 0) > 0) ++busy;
+    EXPECT_LT(busy, 100) << "the connection that cannot be taken wakes the loop without end";
+    EXPECT_EQ(server_->clients(), 1u);
+    server_->publish(sample_report());
+    EXPECT_TRUE(watcher->wait_for("loop"));
+  }
+  EXPECT_TRUE(waiting.wait_for("hello"));
 }
 
 TEST_F(EventServerTest, AClientThatOnlyListensMayCloseItsSide) {

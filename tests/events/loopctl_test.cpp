@@ -238,6 +238,20 @@ TEST_F(LoopctlTest, NamesWhatIsWrongWhenThereIsNoDaemon) {
   }
 }
 
+TEST_F(LoopctlTest, TellsWhenTheDaemonIsFull) {
+  options_.max_clients = 1;
+  start();
+  const auto only = connect();
+  const auto status = run({"status"});
+  ASSERT_TRUE(wait_for_end(*status));
+  EXPECT_EQ(status->exit_code(), 1);
+  EXPECT_THAT(status->err(), HasSubstr("too many clients"));
+  const auto watch = run({"watch"});
+  ASSERT_TRUE(wait_for_end(*watch));
+  EXPECT_EQ(watch->exit_code(), 1);
+  EXPECT_THAT(watch->out(), HasSubstr("ERROR too many clients"));
+}
+
 TEST_F(LoopctlTest, FindsTheSocketByEnvironmentOrCamera) {
   Loopctl by_environment(dir_, {"status"}, {"LOOPD_SOCKET=/nowhere/a.sock"});
   ASSERT_TRUE(wait_for_end(by_environment));
