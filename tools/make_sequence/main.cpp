@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <iostream>
-#include <map>
 #include <string>
 #include <thread>
 
@@ -33,9 +32,13 @@ void add_options(CLI::App& app, SequenceOptions& o) {
   app.add_option("--dont-care", o.dont_care_m, "metres within which other pairs are don't care");
   app.add_option("--fps", o.fps, "write times.txt at this frame rate; 0 = no times");
   app.add_option("--jpeg-quality", o.jpeg_quality, "1..100");
-  app.add_option("--format", o.format, "png or jpg")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, ImageFormat>{
-          {"png", ImageFormat::kPng}, {"jpg", ImageFormat::kJpeg}}));
+  app.add_option_function<std::string>(
+         "--format",
+         [&o](const std::string& name) {
+           o.format = name == "png" ? ImageFormat::kPng : ImageFormat::kJpeg;
+         },
+         "of the images (png if not given)")
+      ->check(CLI::IsMember({"png", "jpg"}));
 }
 
 void show_progress(std::size_t done, std::size_t total) {
