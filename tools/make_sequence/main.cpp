@@ -22,7 +22,7 @@ void add_options(CLI::App& app, SequenceOptions& o) {
   app.add_option("--step", o.step_m, "metres from frame to frame");
   app.add_option("--loop", o.loop_m, "metres once round, in place of --laps")->excludes(laps);
   app.add_option("--seed", o.seed, "of building, walk and noise");
-  app.add_option("--texture", o.texture, "0..1: posters, plates, marks, grain; lines stay");
+  app.add_option("--texture", o.texture, "0..1: posters, plates, marks, grain, tiles; lines stay");
   app.add_option("--noise", o.noise, "sensor noise, standard deviation in grey levels");
   app.add_option("--blur", o.blur_px, "lens blur, standard deviation in pixels");
   app.add_option("--exposure", o.exposure, "amplitude of the slow gain drift, 0..0.9");

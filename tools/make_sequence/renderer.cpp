@@ -355,16 +355,16 @@ double Renderer::shade_floor(const Vec3& p, const Footprint& f) const {
   double value = 112;
   // A tile's own tone fades as the footprint grows past a tile.
   const double size = std::max(f.x, f.y);
-  value += 10 * tile * std::clamp(1.5 - 3 * size / kTileM, 0.0, 1.0);
+  value += 10 * scene_.seams * tile * std::clamp(1.5 - 3 * size / kTileM, 0.0, 1.0);
   if (scene_.grain > 0) value += scene_.grain * 7 * grain_at(p.x, p.y, size);
   const double seam =
       1 - (1 - seams(p.x, f.x, kTileM, 0.008)) * (1 - seams(p.y, f.y, kTileM, 0.008));
-  return blend(value, 65, seam) * light_at(p) * 0.95;
+  return blend(value, 65, scene_.seams * seam) * light_at(p) * 0.95;
 }
 
 double Renderer::shade_ceiling(const Vec3& p, const Footprint& f) const {
   const double seam = 1 - (1 - seams(p.x, f.x, kTileM, 0.02)) * (1 - seams(p.y, f.y, kTileM, 0.02));
-  double value = blend(205, 150, seam) * (0.52 + 0.36 * light_at(p));
+  double value = blend(205, 150, scene_.seams * seam) * (0.52 + 0.36 * light_at(p));
   const int c = static_cast<int>((p.x - lamp_x0_) / kLampCellM);
   const int r = static_cast<int>((p.y - lamp_y0_) / kLampCellM);
   if (c < 0 || r < 0 || c >= lamp_columns_ || r >= lamp_rows_) return value;

@@ -342,6 +342,7 @@ double FloorGrid::read(double x, double y) const {
 Scene build_scene(const SceneOptions& options) {
   Scene scene;
   scene.grain = options.texture;
+  scene.seams = std::min(1.0, 2 * options.texture);
   Random random(mix64(options.seed));
   scene.corners = make_floor_plan(options.loop_m, scene.corner_radius_m, random);
   Builder builder(scene, options);

@@ -76,7 +76,8 @@ class FloorGrid {
 
 struct SceneOptions {
   double loop_m = 60;       ///< length of the walk once round, >= kMinLoopM
-  double texture = 1;       ///< 0..1: how much point-like texture there is; structure lines stay
+  double texture = 1;       ///< 0..1: how much point-like texture there is; structure lines stay.
+                            ///< Below 0.5 tiles and ceiling panels fade too (crossings are points)
   bool lap_change = false;  ///< some lamps differ on odd laps
   std::uint64_t seed = 1;
 };
@@ -89,6 +90,7 @@ struct Scene {
   double height_m = 2.6;
   double corner_radius_m = 1.0;  ///< of the walk
   double grain = 0;              ///< 0..1, strength of the fine wall texture
+  double seams = 1;              ///< 0..1, contrast of floor tiles and ceiling panels
   std::vector<Vec3> corners;     ///< of the centre line, counter-clockwise
   std::vector<Wall> walls;
   std::vector<Box> boxes;
