@@ -35,8 +35,10 @@ struct LoopConfig {
   double one_list_penalty = 0.5;
   int max_candidates = 64;
   int island_gap = 5;
-  double still_fraction = 0.25;
-  double still_radius = 0.004;
+  int verified_islands = 2;
+  int verified_images = 2;
+  double still_fraction = 0.75;
+  double still_radius_px = 1.0;
 };
 
 struct VerifyConfig {

@@ -69,6 +69,8 @@ struct Verification {
   std::array<double, 9> homography{};
   int homography_inliers = 0;  ///< points + lines that agree with the best homography
   int cells = 0;               ///< of 8 x 6 cells of the query image, how many hold an inlier
+  /// Inliers, each cell counting at most 4: how much of the view agrees, not how rich one poster is.
+  int spread_inliers = 0;
 
   int inliers() const { return point_inliers + line_inliers; }
   int matches() const { return point_matches + line_matches; }

@@ -69,13 +69,20 @@ const std::array kParameters = {
     Parameter<Config>{"loop.island_gap", "images", 0, 1000,
                       "Retrieved images this close in time belong to the same island.",
                       LOOPD_REF(loop.island_gap)},
-    Parameter<Config>{"loop.still_fraction", "of the points", 0.01, 1,
-                      "The camera has not moved if this share of the points is where it was; 1 "
-                      "turns the test off in practice.",
+    Parameter<Config>{"loop.verified_islands", "islands", 1, 16,
+                      "The best islands that are verified.", LOOPD_REF(loop.verified_islands)},
+    Parameter<Config>{"loop.verified_images", "images", 1, 16,
+                      "Of each of them, the best images that are verified; the one with the most "
+                      "inliers is the match.",
+                      LOOPD_REF(loop.verified_images)},
+    Parameter<Config>{"loop.still_fraction", "of the features found again", 0.01, 1,
+                      "The camera has not moved if this share of what it sees again is exactly "
+                      "where it was. Noise leaves more than 0.8, a slow hand less than 0.6.",
                       LOOPD_REF(loop.still_fraction)},
-    Parameter<Config>{"loop.still_radius", "of the image width", 0, 0.1,
-                      "How far a point may be from where it was and count as not moved.",
-                      LOOPD_REF(loop.still_radius)},
+    Parameter<Config>{"loop.still_radius_px", "px", 0, 100,
+                      "How far a point of the finest level may be from where it was and count as "
+                      "not moved; coarser levels in proportion.",
+                      LOOPD_REF(loop.still_radius_px)},
 
     Parameter<Config>{"verify.point_ratio", "ratio", 0.1, 1,
                       "NNDR of the point matches of two images.", LOOPD_REF(verify.point_ratio)},
@@ -88,6 +95,14 @@ const std::array kParameters = {
     Parameter<Config>{"verify.max_line_distance", "bits", 0, 256,
                       "Largest Hamming distance of a line match.",
                       LOOPD_REF(verify.max_line_distance)},
+    Parameter<Config>{"verify.line_neighbours", "lines", 1, 100,
+                      "Nearest lines of the candidate that the angle filter sees; 5, 8 and 16 give "
+                      "the same line inliers within 5 %.",
+                      LOOPD_REF(verify.line_neighbours)},
+    Parameter<Config>{"verify.line_angle_filter", "", 0, 1,
+                      "Line matching by appearance and direction (the method); false = plain NNDR, "
+                      "for comparison.",
+                      LOOPD_REF(verify.line_angle_filter)},
     Parameter<Config>{"verify.max_line_angle_deg", "degrees", 1, 180,
                       "Eq. 5: larger angles between two lines, after the global rotation, are no "
                       "match.",

@@ -49,6 +49,12 @@ void copy_head(const std::vector<Candidate>& from, FixedVector<Candidate, N>& to
     if (!to.push_back(c)) return;
 }
 
+// A rich poster gives many inliers in one spot; the view that shares the most shows them all over.
+bool more_convincing(const Verification& a, const Verification& b) {
+  return a.spread_inliers != b.spread_inliers ? a.spread_inliers > b.spread_inliers
+                                              : a.inliers() > b.inliers();
+}
+
 // A copy that holds no spare capacity: it stays for the life of the map.
 Features compact(const Features& features) {
   Features copy = features;
@@ -153,8 +159,8 @@ class Detector::Impl {
     normalise(report);                                             // 3
     fuse(points_, lines_, config_.loop.one_list_penalty, fused_);  // 4
     copy_head(fused_, report.fused);
-    report.island = choose_island();  // 5
-    if (!report.island) return Outcome::kNoCandidates;
+    find_islands();  // 5
+    if (islands_.empty()) return Outcome::kNoCandidates;
     return verify(report);  // 6, 7
   }
 
@@ -183,24 +189,45 @@ class Detector::Impl {
     copy_head(lines_, report.line_candidates);
   }
 
-  std::optional<Island> choose_island() {
+  // Priority only orders: an island that overlaps the one verified for the previous image comes
+  // first.
+  void find_islands() {
     placed_.clear();
     for (const Candidate& c : fused_) placed_.push_back({c.image, map_.position(c.image), c.score});
-    const auto gap = static_cast<std::uint32_t>(config_.loop.island_gap);
-    return select_island(build_islands(placed_, gap), priority_);
+    islands_ = build_islands(placed_, static_cast<std::uint32_t>(config_.loop.island_gap));
+    prefer_island(islands_, priority_);
+    const auto most = static_cast<std::size_t>(config_.loop.verified_islands);
+    if (islands_.size() > most) islands_.resize(most);
   }
 
+  // The candidate with the most inliers of the best images of the best islands. One image of one
+  // island (the paper's way) picks the most similar view, which is often not the one that shares
+  // the most of the scene.
   Outcome verify(Report& report) {
     const StageTimer timer(report.times.verify_ns);
-    const MapImage& candidate = *map_.find(report.island->best);
-    const auto fused = std::find_if(fused_.begin(), fused_.end(),
-                                    [&](const Candidate& c) { return c.image == candidate.id; });
-    report.match = Match{candidate.id, candidate.sequence, candidate.time_ns, fused->score};
-    report.verification =
-        verifier_.verify(features_, candidate.features, seed_of(report.query), report.pairs);
+    for (const Island& island : islands_) {
+      int left = config_.loop.verified_images;
+      for (const Candidate& c : fused_) {
+        if (c.image < island.first || c.image > island.last) continue;
+        if (left-- == 0) break;
+        verify_candidate(island, c, report);
+      }
+    }
     if (report.verification->matches() < config_.verify.min_inliers) return Outcome::kFewMatches;
     if (report.verification->inliers() < config_.verify.min_inliers) return Outcome::kFewInliers;
     return Outcome::kLoop;
+  }
+
+  // Keeps the evidence in `report` if it is the best so far.
+  void verify_candidate(const Island& island, const Candidate& c, Report& report) {
+    const MapImage& image = *map_.find(c.image);
+    const Verification found =
+        verifier_.verify(features_, image.features, seed_of(report.query), pairs_);
+    if (report.verification && !more_convincing(found, *report.verification)) return;
+    report.island = island;
+    report.match = Match{image.id, image.sequence, image.time_ns, c.score};
+    report.verification = found;
+    report.pairs = pairs_;
   }
 
   std::uint64_t seed_of(ImageId query) const {
@@ -242,6 +269,8 @@ class Detector::Impl {
   std::vector<Candidate> lines_;
   std::vector<Candidate> fused_;
   std::vector<PlacedCandidate> placed_;
+  std::vector<Island> islands_;
+  InlierPairs pairs_;
 };
 
 Detector::Detector(const Config& config, LaneExecutor* lanes)

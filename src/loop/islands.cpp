@@ -64,13 +64,10 @@ std::vector<Island> build_islands(std::span<const PlacedCandidate> candidates, s
   return islands;
 }
 
-std::optional<Island> select_island(std::span<const Island> islands,
-                                    const std::optional<Island>& priority) {
-  if (islands.empty()) return std::nullopt;
-  if (priority)
-    for (const Island& island : islands)
-      if (overlap(island, *priority)) return island;
-  return islands.front();
+void prefer_island(std::vector<Island>& islands, const std::optional<Island>& priority) {
+  if (!priority) return;
+  std::stable_partition(islands.begin(), islands.end(),
+                        [&](const Island& island) { return overlap(island, *priority); });
 }
 
 }  // namespace loopd

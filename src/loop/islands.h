@@ -23,9 +23,8 @@ struct PlacedCandidate {
 /// retrieved count 0. Best island first, ties by older image.
 std::vector<Island> build_islands(std::span<const PlacedCandidate> candidates, std::uint32_t gap);
 
-/// The island to verify: the best of those that overlap `priority` (the island of the previous
-/// image, if its loop was verified), else the best of all. None if there are no islands.
-std::optional<Island> select_island(std::span<const Island> islands,
-                                    const std::optional<Island>& priority);
+/// Moves the islands that overlap `priority` (the island of the previous image, if its loop was
+/// verified) to the front; the order is otherwise kept.
+void prefer_island(std::vector<Island>& islands, const std::optional<Island>& priority);
 
 }  // namespace loopd

@@ -41,13 +41,20 @@ int cell_of(double x, int width_px, int cells) {
   return static_cast<int>(std::clamp(std::floor((x + 0.5) * cells / width_px), 0.0, cells - 1.0));
 }
 
-int count_cells(const InlierPairs& pairs, const Features& query) {
-  if (query.width_px < 1 || query.height_px < 1) return 0;
-  std::array<bool, kCellColumns * kCellRows> hit{};
+constexpr int kMaxPerCell = 4;  // inliers of one cell that count for spread_inliers
+
+// Where in the query image the inliers are: Verification::cells and ::spread_inliers.
+void measure_spread(const InlierPairs& pairs, const Features& query, Verification& out) {
+  if (query.width_px < 1 || query.height_px < 1) return;
+  std::array<int, kCellColumns * kCellRows> held{};
   for (const InlierPair& p : pairs)
-    hit[static_cast<std::size_t>(cell_of(p.query_y_px, query.height_px, kCellRows) * kCellColumns +
-                                 cell_of(p.query_x_px, query.width_px, kCellColumns))] = true;
-  return static_cast<int>(std::count(hit.begin(), hit.end(), true));
+    ++held[static_cast<std::size_t>(cell_of(p.query_y_px, query.height_px, kCellRows) *
+                                        kCellColumns +
+                                    cell_of(p.query_x_px, query.width_px, kCellColumns))];
+  for (const int count : held) {
+    out.cells += count > 0 ? 1 : 0;
+    out.spread_inliers += std::min(count, kMaxPerCell);
+  }
 }
 
 }  // namespace
@@ -74,7 +81,7 @@ class Verifier::Impl {
     if (epipolar) out.fundamental = fundamental_in_pixels(epipolar->fundamental, c_);
     choose(plane, epipolar, query, candidate, out);
     list_inliers(query, candidate, pairs);
-    out.cells = count_cells(pairs, query);
+    measure_spread(pairs, query, out);
     return out;
   }
 
