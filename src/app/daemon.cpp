@@ -71,7 +71,7 @@ Result<std::unique_ptr<Daemon>> Daemon::start(const DaemonConfig& config, const 
   log.info("listening", {{"socket", event_socket_path(config)},
                          {"camera", config.camera.name},
                          {"source", daemon->pipeline_->camera_text()}});
-  sd_notify(0, "READY=1");
+  daemon->systemd_.tell("READY=1");
   return daemon;
 }
 
@@ -154,7 +154,7 @@ void Daemon::tell(const Notice& notice) {
 void Daemon::publish_stats() {
   const StatsRecord record = stats_.record(*pipeline_, monotonic_now_ns());
   server_->publish_stats(record);
-  sd_notify(0, ("STATUS=" + status_text(record, server_->clients())).c_str());
+  systemd_.tell("STATUS=" + status_text(record, server_->clients()));
   const std::uint64_t dropped = pipeline_->dropped_reports();
   if (dropped > std::exchange(dropped_reports_told_, dropped))
     log_.warning("reports dropped on their way to the socket; raise events.report_queue",
@@ -167,7 +167,7 @@ void Daemon::feed_watchdog() {
                       .errors_in_row = totals.errors_in_row,
                       .work_pending = pipeline_->work_pending(),
                       .camera_away = pipeline_->capture().away || !pipeline_started_};
-  if (liveness_->alive(vitals, monotonic_now_ns())) sd_notify(0, "WATCHDOG=1");
+  if (liveness_->alive(vitals, monotonic_now_ns())) systemd_.tell("WATCHDOG=1");
 }
 
 void Daemon::end_on_signal(const char* name) {
@@ -177,7 +177,7 @@ void Daemon::end_on_signal(const char* name) {
 }
 
 Status Daemon::shut_down() {
-  sd_notify(0, "STOPPING=1");
+  systemd_.tell("STOPPING=1");
   pipeline_->stop();
   take_from_pipeline();
   publish_stats();

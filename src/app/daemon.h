@@ -9,6 +9,7 @@
 #include "app/event_loop.h"
 #include "app/liveness.h"
 #include "app/pipeline.h"
+#include "app/service_notifier.h"
 #include "app/stats_meter.h"
 #include "base/log.h"
 #include "base/result.h"
@@ -50,6 +51,7 @@ class Daemon {
 
   const DaemonConfig config_;
   const Log log_;
+  const ServiceNotifier systemd_;
   std::unique_ptr<EventLoop> loop_;
   std::unique_ptr<Pipeline> pipeline_;
   std::unique_ptr<EventServer> server_;
