@@ -34,9 +34,8 @@ bool has_image_name(const fs::path& path) {
   return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
 }
 
-// Paths of the images in `folder`, sorted by name. Nothing is opened: a frame that turns out to be
-// unreadable costs that frame, and the numbers of the others stay.
-Result<std::vector<std::string>> list_images(const fs::path& folder) {
+// Paths of the images in `folder`, sorted by name.
+Result<std::vector<std::string>> images_of(const fs::path& folder) {
   std::vector<std::string> images;
   std::error_code error;
   fs::directory_iterator entry(folder, error);
@@ -46,8 +45,18 @@ Result<std::vector<std::string>> list_images(const fs::path& folder) {
       return Error{"the folder " + folder.string() + " holds more than a million images", EFBIG};
   }
   if (error) return errno_error("cannot list the folder " + folder.string(), error.value());
+  if (images.empty())
+    return Error{"no image in the folder " + folder.string() +
+                     "; it needs files named *.jpg, *.jpeg, *.png, *.pgm, *.ppm or *.pnm",
+                 ENOENT};
   std::sort(images.begin(), images.end());
   return images;
+}
+
+// The folder that holds the images: `path`, or the images/ in it.
+fs::path image_folder(const fs::path& path) {
+  std::error_code ignored;
+  return fs::is_directory(path / "images", ignored) ? path / "images" : path;
 }
 
 // The times of `images` images from the first times.txt among `folders`; empty if there is none.
@@ -171,21 +180,20 @@ class FolderSource : public FrameSource {
 
 }  // namespace
 
+Result<std::vector<std::string>> list_images(const std::string& path) {
+  std::error_code ignored;
+  if (!fs::is_directory(path, ignored)) return std::vector<std::string>{path};
+  return images_of(image_folder(path));
+}
+
 Result<std::unique_ptr<FrameSource>> open_folder_source(const SourceOptions& options) {
   const fs::path path = options.path;
-  std::error_code ignored;
-  const bool is_folder = fs::is_directory(path, ignored);
-  const bool has_images = is_folder && fs::is_directory(path / "images", ignored);
-  const fs::path folder = has_images ? path / "images" : path;
-  Result<std::vector<std::string>> images =
-      is_folder ? list_images(folder) : std::vector<std::string>{options.path};
+  Result<std::vector<std::string>> images = list_images(options.path);
   if (!images.ok()) return images.error();
-  if (images->empty())
-    return Error{"no image in the folder " + folder.string() +
-                     "; it needs files named *.jpg, *.jpeg, *.png, *.pgm, *.ppm or *.pnm",
-                 ENOENT};
   Result<std::vector<std::int64_t>> times = std::vector<std::int64_t>();
-  if (is_folder) times = read_times({path, folder}, images->size());
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored))
+    times = read_times({path, image_folder(path)}, images->size());
   if (!times.ok()) return times.error();
   return std::unique_ptr<FrameSource>(
       std::make_unique<FolderSource>(options, std::move(images).value(), std::move(times).value()));
