@@ -118,6 +118,12 @@ void Gallery::offer(const Report& report, const std::string& file) {
   if (loops_.size() > capacity_) loops_.pop_back();
 }
 
+std::vector<std::uint64_t> Gallery::queries() const {
+  std::vector<std::uint64_t> queries;
+  for (const Loop& loop : loops_) queries.push_back(loop.query);
+  return queries;
+}
+
 Status Gallery::draw(DaemonConfig config, const fs::path& folder) const {
   if (capacity_ == 0) return Nothing{};
   if (Status made = make_empty(folder); !made) return made;

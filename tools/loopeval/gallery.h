@@ -25,6 +25,8 @@ class Gallery {
   void offer(const Report& report, const std::string& file);
 
   std::size_t size() const { return loops_.size(); }
+  /// Queries of the kept loops, the best first.
+  std::vector<std::uint64_t> queries() const;
 
   /// Reads the images again from the recording of `config` and writes a PNG for each loop into
   /// `folder` (made if missing; pictures of an earlier run are removed from it). Does nothing for a
