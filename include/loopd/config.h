@@ -15,7 +15,7 @@ struct FeaturesConfig {
   int points = 1500;
   int lines = 300;
   int max_pixels = 1'000'000;
-  int fast_threshold = 12;
+  int fast_threshold = 7;
   double scale_factor = 1.2;
   int levels = 8;
   double min_line_length = 0.03;
@@ -35,7 +35,7 @@ struct LoopConfig {
   double one_list_penalty = 0.5;
   int max_candidates = 64;
   int island_gap = 5;
-  int verified_islands = 2;
+  int verified_islands = 3;
   int verified_images = 2;
   double still_fraction = 0.75;
   double still_radius_px = 1.0;
@@ -44,14 +44,14 @@ struct LoopConfig {
 struct VerifyConfig {
   double point_ratio = 0.8;
   int max_point_distance = 64;
-  double line_ratio = 0.9;
+  double line_ratio = 0.8;
   int max_line_distance = 80;
   double max_line_angle_deg = 20.0;
   int line_neighbours = 8;
   bool line_angle_filter = true;
   double epipolar_px = 2.0;
   int max_iterations = 1000;
-  int min_inliers = 20;
+  int min_inliers = 40;
   int seed = 1;
 };
 

@@ -15,15 +15,13 @@ using ImageId = std::uint32_t;
 
 /// What became of a frame. Everything but `kLoop` names the reason why there is no loop.
 enum class Outcome : std::uint8_t {
-  kLoop,            ///< a place seen before, verified geometrically
-  kNoFeatures,      ///< too little in the image to say anything
-  kMapEmpty,        ///< nothing searchable yet
-  kNoCandidates,    ///< no earlier image is similar
-  kFewMatches,      ///< the best candidate has too few matching points and lines
-  kFewInliers,      ///< no epipolar geometry or homography holds for enough of them
-  kNotDistinctive,  ///< enough inliers, but another place fits as well, or they sit in one spot
-  kNotConfirmed,    ///< good, but not yet supported by neighbouring frames
-  kError,           ///< processing this frame failed; the map is unchanged
+  kLoop,          ///< a place seen before, verified geometrically
+  kNoFeatures,    ///< too little in the image to say anything
+  kMapEmpty,      ///< nothing searchable yet
+  kNoCandidates,  ///< no earlier image is similar
+  kFewMatches,    ///< the best candidate has too few matching points and lines
+  kFewInliers,    ///< no epipolar geometry or homography holds for enough of them
+  kError,         ///< processing this frame failed; the map is unchanged
 };
 
 /// Stable lower-case name, as in `frames.csv` and in events: "loop", "no_features", ...
@@ -60,6 +58,9 @@ struct InlierPair {
 struct Verification {
   int point_matches = 0;  ///< matched points before the model
   int line_matches = 0;
+  int agreeing = 0;  ///< matches, points + lines, that fit the model
+  /// Agreeing points in distinct places: those in one of 48 x 48 cells (of either image) are the
+  /// same evidence, since one corner answers on several pyramid levels, and count once.
   int point_inliers = 0;
   int line_inliers = 0;  ///< a line counts once, however many of its end points agree
   Model model = Model::kFundamental;
@@ -69,7 +70,8 @@ struct Verification {
   std::array<double, 9> homography{};
   int homography_inliers = 0;  ///< points + lines that agree with the best homography
   int cells = 0;               ///< of 8 x 6 cells of the query image, how many hold an inlier
-  /// Inliers, each cell counting at most 4: how much of the view agrees, not how rich one poster is.
+  /// Inliers, each cell counting at most 4: how much of the view agrees, not how rich one poster
+  /// is.
   int spread_inliers = 0;
 
   int inliers() const { return point_inliers + line_inliers; }

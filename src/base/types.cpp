@@ -17,10 +17,6 @@ std::string_view outcome_name(Outcome outcome) {
       return "few_matches";
     case Outcome::kFewInliers:
       return "few_inliers";
-    case Outcome::kNotDistinctive:
-      return "not_distinctive";
-    case Outcome::kNotConfirmed:
-      return "not_confirmed";
     case Outcome::kError:
       return "error";
   }

@@ -160,6 +160,7 @@ class VideoSource : public FrameSource {
   }
 
   std::optional<std::int64_t> time_ns(std::uint64_t sequence) const override {
+    if (options_.live) return read_ns_;
     const double fps = options_.nominal_fps > 0 ? options_.nominal_fps : video_.header.fps;
     if (fps <= 0) return std::nullopt;
     return std::llround(static_cast<double>(sequence) * 1e9 / fps);
@@ -169,8 +170,8 @@ class VideoSource : public FrameSource {
 
   std::string describe() const override {
     const Y4mHeader& header = video_.header;
-    return "video of " + std::to_string(header.size.width_px) + "x" +
-           std::to_string(header.size.height_px) +
+    return std::string(options_.live ? "device of " : "video of ") +
+           std::to_string(header.size.width_px) + "x" + std::to_string(header.size.height_px) +
            (header.fps > 0 ? " at " + rate_text(header.fps) + " fps, " : ", ") + options_.path;
   }
 
@@ -185,6 +186,7 @@ class VideoSource : public FrameSource {
     if (got != Got::kAll) return got;
     if (std::memcmp(line.data(), kFrameLine.data(), line.size()) != 0) return Got::kCut;
     const Got body = video_.stream.read(pixels_);
+    read_ns_ = monotonic_now_ns();
     return body == Got::kEnd ? Got::kCut : body;
   }
 
@@ -211,8 +213,9 @@ class VideoSource : public FrameSource {
   CameraError failure(CameraFault fault, const std::string& cause, std::uint64_t sequence) {
     const std::string said = video_.stream.complaint();
     return {fault,
-            "cannot go on with the video " + options_.path + " after frame " +
-                std::to_string(position_) + ": " + cause + (said.empty() ? "" : " (" + said + ")"),
+            (options_.live ? "cannot go on with the device " : "cannot go on with the video ") +
+                options_.path + " after frame " + std::to_string(position_) + ": " + cause +
+                (said.empty() ? "" : " (" + said + ")"),
             0, true, sequence};
   }
 
@@ -223,11 +226,14 @@ class VideoSource : public FrameSource {
   std::vector<std::uint8_t> pixels_;  ///< the newest frame read
   std::uint64_t position_ = 0;        ///< frames read, over all laps
   std::uint64_t lap_frames_ = 0;      ///< frames read in this lap
+  std::int64_t read_ns_ = 0;          ///< CLOCK_MONOTONIC when `pixels_` was read
   bool ended_ = false;
 };
 
 Error cannot_decode(const SourceOptions& options, const std::string& cause) {
-  return {"cannot decode the video " + options.path + ": " + cause, 0};
+  return {(options.live ? "cannot read the device " : "cannot decode the video ") + options.path +
+              ": " + cause,
+          0};
 }
 
 Result<OpenVideo> VideoSource::open(const SourceOptions& options,
@@ -251,7 +257,7 @@ Result<OpenVideo> VideoSource::open(const SourceOptions& options,
     return cannot_decode(options, "its frames are " + std::to_string(header.value().size.width_px) +
                                       "x" + std::to_string(header.value().size.height_px) +
                                       ", more than the " + std::to_string(options.max_pixels) +
-                                      " pixels of camera.max_width x camera.max_height");
+                                      " pixels of camera.max_pixels");
   video.header = header.value();
   return video;
 }
@@ -311,8 +317,7 @@ Result<std::unique_ptr<FrameSource>> open_video_source(const SourceOptions& opti
   }
   return Error{"cannot decode the video " + options.path + ": the program " +
                    (decoder.empty() ? "loopd-video" : decoder) +
-                   " is not there or cannot be run; install it beside loopd or name it in "
-                   "camera.video_decoder",
+                   " is not there or cannot be run; install it beside loopd or in PATH",
                ENOENT};
 }
 

@@ -67,7 +67,7 @@ Json island_json(const Island& island) {
 Json inliers_json(const Verification& verification) {
   Json json{{"points", verification.point_inliers}, {"lines", verification.line_inliers}};
   if (verification.matches() > 0) {
-    json["ratio"] = static_cast<double>(verification.inliers()) / verification.matches();
+    json["ratio"] = static_cast<double>(verification.agreeing) / verification.matches();
   }
   json["spread"] = verification.cells / kCells;
   return json;

@@ -24,7 +24,8 @@ const std::array kParameters = {
                       LOOPD_REF(features.max_pixels)},
     Parameter<Config>{"features.fast_threshold", "grey levels", 1, 100,
                       "Contrast of a FAST corner. Low, because plain walls offer little; the "
-                      "strongest are kept anyway.",
+                      "strongest are kept anyway. Recall at 100 % precision on a plain corridor: "
+                      "97.6 % with 7, 95.1 % with 12 and 20.",
                       LOOPD_REF(features.fast_threshold)},
     Parameter<Config>{"features.scale_factor", "ratio", 1.05, 2.0,
                       "Step between the levels of ORB's image pyramid.",
@@ -90,7 +91,8 @@ const std::array kParameters = {
                       "Largest Hamming distance of a point match.",
                       LOOPD_REF(verify.max_point_distance)},
     Parameter<Config>{"verify.line_ratio", "ratio", 0.1, 1,
-                      "NNDR of the line matches, among lines of the right direction.",
+                      "NNDR of the line matches, among lines of the right direction. 0.8 had "
+                      "more recall at 100 % precision on real sequences than 0.9 and 0.95.",
                       LOOPD_REF(verify.line_ratio)},
     Parameter<Config>{"verify.max_line_distance", "bits", 0, 256,
                       "Largest Hamming distance of a line match.",
@@ -112,7 +114,9 @@ const std::array kParameters = {
                       LOOPD_REF(verify.epipolar_px)},
     Parameter<Config>{"verify.max_iterations", "samples", 10, 100'000,
                       "Bound of the random sampling.", LOOPD_REF(verify.max_iterations)},
-    Parameter<Config>{"verify.min_inliers", "points + lines", 8, 10'000, "Fewer are no loop.",
+    Parameter<Config>{"verify.min_inliers", "points + lines", 8, 10'000,
+                      "Fewer, in distinct places, are no loop. On the real sequences measured no "
+                      "false candidate has more than 30.",
                       LOOPD_REF(verify.min_inliers)},
     Parameter<Config>{"verify.seed", "", 0, 2'147'483'647,
                       "Seed of the random sampling: the same seed gives the same decisions.",

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <chrono>
+#include <cmath>
 #include <exception>
 #include <utility>
 
@@ -35,6 +36,9 @@ class StageTimer {
   SteadyClock::time_point start_;
 };
 
+constexpr int kMaxStillCredit = 10;                   // frames
+constexpr std::int64_t kMaxFrameNs = 10'000'000'000;  // a longer pause is no time under way
+
 class InlineLanes : public LaneExecutor {
  public:
   void run(const std::function<void()>& points, const std::function<void()>& lines) override {
@@ -49,10 +53,9 @@ void copy_head(const std::vector<Candidate>& from, FixedVector<Candidate, N>& to
     if (!to.push_back(c)) return;
 }
 
-// A rich poster gives many inliers in one spot; the view that shares the most shows them all over.
-bool more_convincing(const Verification& a, const Verification& b) {
-  return a.spread_inliers != b.spread_inliers ? a.spread_inliers > b.spread_inliers
-                                              : a.inliers() > b.inliers();
+// The view that shares the most shows its inliers all over; a rich poster has them in one spot.
+double conviction(const Verification& v) {
+  return v.inliers() * std::sqrt(static_cast<double>(v.cells));
 }
 
 // A copy that holds no spare capacity: it stays for the life of the map.
@@ -75,7 +78,8 @@ class Detector::Impl {
         extractor_(config.features),
         point_words_(config.index),
         line_words_(config.index),
-        verifier_(config.verify),
+        point_lane_verifier_(config.verify),
+        line_lane_verifier_(config.verify),
         stillness_(config.loop),
         map_(config.loop) {
     assert(validate(config).empty());
@@ -141,6 +145,14 @@ class Detector::Impl {
   }
 
  private:
+  // One candidate of this frame and what its verification found.
+  struct Trial {
+    Island island;
+    Candidate candidate;
+    Verification found;
+    InlierPairs pairs;
+  };
+
   // 1
   void describe(const LumaView& image) {
     extractor_.prepare(image, features_);
@@ -164,15 +176,26 @@ class Detector::Impl {
     return verify(report);  // 6, 7
   }
 
-  // A frame that shows what the last kept image shows adds nothing, and time does not pass for the
-  // waiting window: a parked robot closes no loop with itself.
+  // A frame that shows what the last kept image shows adds nothing to the map. And the waiting
+  // window's clock stops while the camera is parked, so that a parked robot closes no loop with
+  // itself: a still frame counts only if a moving one paid for it (a slow hand stands still at
+  // times, too).
   void notice_motion(Report& report) {
     const MapImage* newest = map_.newest();
     report.still = newest != nullptr && stillness_.is_still(newest->features, features_);
-    if (!report.still && report.time_ns && last_time_ns_ && *report.time_ns > *last_time_ns_)
-      moving_ns_ += *report.time_ns - *last_time_ns_;
-    last_time_ns_ = report.time_ns;
     pending_ = !report.still;
+
+    const auto elapsed_ns = report.time_ns && last_time_ns_ && *report.time_ns > *last_time_ns_
+                                ? *report.time_ns - *last_time_ns_
+                                : 0;
+    last_time_ns_ = report.time_ns;
+    still_credit_ = std::min(kMaxStillCredit, still_credit_ + (report.still ? -1 : 1));
+    if (still_credit_ < 0) {
+      still_credit_ = 0;
+      return;
+    }
+    ++clock_.frames;
+    clock_.ns += std::min(elapsed_ns, kMaxFrameNs);
   }
 
   void search(Report& report) {
@@ -200,34 +223,54 @@ class Detector::Impl {
     if (islands_.size() > most) islands_.resize(most);
   }
 
-  // The candidate with the most inliers of the best images of the best islands. One image of one
-  // island (the paper's way) picks the most similar view, which is often not the one that shares
-  // the most of the scene.
+  // The most convincing of the best images of the best islands. One image of one island (the
+  // paper's way) picks the most similar view, which is often not the one that shares the most of
+  // the scene.
   Outcome verify(Report& report) {
     const StageTimer timer(report.times.verify_ns);
+    const std::uint64_t seed = seed_of(report.query);
+    list_trials();
+    lanes_.run([&] { run_trials(0, seed, point_lane_verifier_); },
+               [&] { run_trials(1, seed, line_lane_verifier_); });
+    const Trial& best = *std::max_element(
+        trials_.begin(), trials_.begin() + static_cast<std::ptrdiff_t>(trial_count_),
+        [](const Trial& a, const Trial& b) { return conviction(a.found) < conviction(b.found); });
+    const MapImage& image = *map_.find(best.candidate.image);
+    report.island = best.island;
+    report.match = Match{image.id, image.sequence, image.time_ns, best.candidate.score};
+    report.verification = best.found;
+    report.pairs = best.pairs;
+    return judge(best.found);
+  }
+
+  // What is verified for this frame: the best images of the best islands, in that order.
+  void list_trials() {
+    trial_count_ = 0;
     for (const Island& island : islands_) {
       int left = config_.loop.verified_images;
       for (const Candidate& c : fused_) {
         if (c.image < island.first || c.image > island.last) continue;
         if (left-- == 0) break;
-        verify_candidate(island, c, report);
+        if (trial_count_ == trials_.size()) trials_.emplace_back();
+        trials_[trial_count_].island = island;
+        trials_[trial_count_++].candidate = c;
       }
     }
-    if (report.verification->matches() < config_.verify.min_inliers) return Outcome::kFewMatches;
-    if (report.verification->inliers() < config_.verify.min_inliers) return Outcome::kFewInliers;
-    return Outcome::kLoop;
   }
 
-  // Keeps the evidence in `report` if it is the best so far.
-  void verify_candidate(const Island& island, const Candidate& c, Report& report) {
-    const MapImage& image = *map_.find(c.image);
-    const Verification found =
-        verifier_.verify(features_, image.features, seed_of(report.query), pairs_);
-    if (report.verification && !more_convincing(found, *report.verification)) return;
-    report.island = island;
-    report.match = Match{image.id, image.sequence, image.time_ns, c.score};
-    report.verification = found;
-    report.pairs = pairs_;
+  // Every second trial, so that two lanes share the work; each is independent of all others.
+  void run_trials(std::size_t first, std::uint64_t seed, Verifier& verifier) {
+    for (std::size_t i = first; i < trial_count_; i += 2) {
+      Trial& trial = trials_[i];
+      const Features& candidate = map_.find(trial.candidate.image)->features;
+      trial.found = verifier.verify(features_, candidate, seed, trial.pairs);
+    }
+  }
+
+  Outcome judge(const Verification& found) const {
+    if (found.matches() < config_.verify.min_inliers) return Outcome::kFewMatches;
+    if (found.inliers() < config_.verify.min_inliers) return Outcome::kFewInliers;
+    return Outcome::kLoop;
   }
 
   std::uint64_t seed_of(ImageId query) const {
@@ -235,13 +278,14 @@ class Detector::Impl {
   }
 
   void keep(const Report& report) {
-    map_.push({report.query, report.sequence, report.time_ns, moving_ns_, compact(features_)});
+    map_.push({report.query, report.sequence, report.time_ns, clock_, compact(features_)});
   }
 
   // 8. At most two images a frame, so that a frame's time stays bounded after a pause.
   void admit_ready() {
+    const WaitingClock next{clock_.frames + 1, clock_.ns};
     for (int i = 0; i < 2; ++i) {
-      const MapImage* image = map_.ready(moving_ns_);
+      const MapImage* image = map_.ready(next);
       if (image == nullptr) return;
       lanes_.run([&] { point_words_.add(image->id, image->features.point_descriptors); },
                  [&] { line_words_.add(image->id, image->features.line_descriptors); });
@@ -255,7 +299,8 @@ class Detector::Impl {
   FeatureExtractor extractor_;
   Vocabulary point_words_;
   Vocabulary line_words_;
-  Verifier verifier_;
+  Verifier point_lane_verifier_;
+  Verifier line_lane_verifier_;
   StillnessTest stillness_;
   ImageMap map_;
 
@@ -263,14 +308,17 @@ class Detector::Impl {
   Features features_;     // of the newest frame
   bool pending_ = false;  // the newest frame waits for absorb() to keep it
   std::optional<std::int64_t> last_time_ns_;
-  std::int64_t moving_ns_ = 0;
+  int still_credit_ = 0;
+  WaitingClock clock_;
   std::optional<Island> priority_;
   std::vector<Candidate> points_;
   std::vector<Candidate> lines_;
   std::vector<Candidate> fused_;
   std::vector<PlacedCandidate> placed_;
   std::vector<Island> islands_;
-  InlierPairs pairs_;
+  std::vector<Trial>
+      trials_;  // grows to its largest and stays; the first trial_count_ are this frame's
+  std::size_t trial_count_ = 0;
 };
 
 Detector::Detector(const Config& config, LaneExecutor* lanes)

@@ -21,11 +21,12 @@ void ImageMap::push(MapImage image) {
   bytes_ += size;
 }
 
-const MapImage* ImageMap::ready(std::int64_t moving_ns) const {
-  if (waiting_.size() <= static_cast<std::size_t>(config_.waiting_frames)) return nullptr;
+const MapImage* ImageMap::ready(const WaitingClock& next) const {
+  if (waiting_.empty()) return nullptr;
   const MapImage& oldest = waiting_.front();
+  if (next.frames - oldest.taken.frames < config_.waiting_frames) return nullptr;
   const auto waiting_ns = static_cast<std::int64_t>(config_.waiting_s * 1e9);
-  if (oldest.time_ns && moving_ns - oldest.moving_ns < waiting_ns) return nullptr;
+  if (oldest.time_ns && next.ns - oldest.taken.ns < waiting_ns) return nullptr;
   return &oldest;
 }
 

@@ -12,12 +12,19 @@
 
 namespace loopd {
 
+/// What the waiting window counts by: frames, and time where it is known, less those for which the
+/// camera was parked.
+struct WaitingClock {
+  std::int64_t frames = 0;
+  std::int64_t ns = 0;
+};
+
 /// One image kept: where it came from and what it shows.
 struct MapImage {
   ImageId id = 0;
   std::uint64_t sequence = 0;
   std::optional<std::int64_t> time_ns;
-  std::int64_t moving_ns = 0;  ///< how long the camera had been moving when it was taken
+  WaitingClock taken;  ///< when it was taken
   Features features;
 };
 
@@ -29,9 +36,8 @@ class ImageMap {
 
   /// Puts an image at the end of the waiting window. Ids and times grow.
   void push(MapImage image);
-  /// The oldest waiting image if it may leave the window now, else null. `moving_ns` as in
-  /// MapImage.
-  const MapImage* ready(std::int64_t moving_ns) const;
+  /// The oldest waiting image if a frame taken at `next` may find it, else null.
+  const MapImage* ready(const WaitingClock& next) const;
   /// Makes that image searchable. Precondition: ready() was not null.
   void admit();
 

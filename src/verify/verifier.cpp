@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bitset>
 #include <cassert>
 #include <cmath>
 #include <optional>
@@ -41,6 +42,7 @@ int cell_of(double x, int width_px, int cells) {
   return static_cast<int>(std::clamp(std::floor((x + 0.5) * cells / width_px), 0.0, cells - 1.0));
 }
 
+constexpr int kDistinctCells = 48;
 constexpr int kMaxPerCell = 4;  // inliers of one cell that count for spread_inliers
 
 // Where in the query image the inliers are: Verification::cells and ::spread_inliers.
@@ -55,6 +57,26 @@ void measure_spread(const InlierPairs& pairs, const Features& query, Verificatio
     out.cells += count > 0 ? 1 : 0;
     out.spread_inliers += std::min(count, kMaxPerCell);
   }
+}
+
+// Points among the inliers whose places are new in both images; see Verification::point_inliers.
+int count_distinct_points(const InlierPairs& pairs, const Features& query,
+                          const Features& candidate) {
+  std::bitset<kDistinctCells * kDistinctCells> in_query, in_candidate;
+  const auto place = [](float x, float y, const Features& image) {
+    return static_cast<std::size_t>(cell_of(y, image.height_px, kDistinctCells) * kDistinctCells +
+                                    cell_of(x, image.width_px, kDistinctCells));
+  };
+  int distinct = 0;
+  for (const InlierPair& p : pairs) {
+    if (p.is_line) continue;
+    const std::size_t q = place(p.query_x_px, p.query_y_px, query);
+    const std::size_t c = place(p.match_x_px, p.match_y_px, candidate);
+    distinct += !in_query[q] && !in_candidate[c] ? 1 : 0;
+    in_query.set(q);
+    in_candidate.set(c);
+  }
+  return distinct;
 }
 
 }  // namespace
@@ -81,6 +103,7 @@ class Verifier::Impl {
     if (epipolar) out.fundamental = fundamental_in_pixels(epipolar->fundamental, c_);
     choose(plane, epipolar, query, candidate, out);
     list_inliers(query, candidate, pairs);
+    out.point_inliers = count_distinct_points(pairs, query, candidate);
     measure_spread(pairs, query, out);
     return out;
   }
@@ -135,7 +158,7 @@ class Verifier::Impl {
       out.model = rotated ? Model::kRotation : Model::kHomography;
     }
     chosen_residuals_ = planar ? homography_residuals_ : epipolar_residuals_;
-    out.point_inliers = static_cast<int>(planar ? h.points : f.points);
+    out.agreeing = static_cast<int>(planar ? h.features() : f.features());
     out.line_inliers = static_cast<int>(planar ? h.lines : f.lines);
   }
 
