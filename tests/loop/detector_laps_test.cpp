@@ -1,0 +1,168 @@
+// The main job: a second lap of a walk is recognised, and nothing else is.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "loop/detector_run.h"
+
+namespace loopd {
+namespace {
+
+using testing::Image;
+using testing::laps_of;
+using testing::small_config;
+using testing::TestRun;
+using testing::View;
+using testing::walk;
+
+constexpr int kViews = 30;
+
+/// What must hold for every report, whatever was seen.
+void expect_consistent(const Report& r, const Config& config) {
+  EXPECT_EQ(r.match.has_value(), r.verification.has_value());
+  EXPECT_EQ(r.match.has_value(), r.island.has_value());
+  for (const auto* list : {&r.point_candidates, &r.line_candidates, &r.fused})
+    for (const Candidate& c : *list) {
+      EXPECT_GE(c.score, 0.0);
+      EXPECT_LE(c.score, 1.0);
+      EXPECT_LE(c.image + static_cast<ImageId>(config.loop.waiting_frames), r.query);
+    }
+  if (!r.match) return;
+  EXPECT_GE(r.match->image, r.island->first);
+  EXPECT_LE(r.match->image, r.island->last);
+  EXPECT_GE(r.island->best, r.island->first);
+  EXPECT_LE(r.island->best, r.island->last);
+  EXPECT_GE(r.match->similarity, 0.0);
+  EXPECT_LE(r.match->similarity, 1.0);
+}
+
+void expect_verified(const Report& r, const Config& config) {
+  ASSERT_TRUE(r.verification.has_value());
+  EXPECT_GE(r.verification->inliers(), config.verify.min_inliers);
+  EXPECT_GE(r.verification->matches(), r.verification->inliers());
+  EXPECT_GT(r.verification->cells, 0);
+  const auto lines = static_cast<int>(std::count_if(
+      r.pairs.begin(), r.pairs.end(), [](const InlierPair& pair) { return pair.is_line; }));
+  const int points = static_cast<int>(r.pairs.size()) - lines;
+  EXPECT_GE(points, r.verification->point_inliers);  // several may be the same evidence
+  EXPECT_GE(lines, r.verification->line_inliers);    // one or two for every line
+  EXPECT_LE(lines, 2 * r.verification->line_inliers);
+}
+
+/// Walks two laps and expects every view of the second to find its wall in the first.
+void expect_second_lap_recognised(const Config& config) {
+  const std::vector<View> lap = walk(kViews);
+  const std::vector<Image> images = laps_of(lap, 2);
+  TestRun run(config);
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    SCOPED_TRACE("frame " + std::to_string(i));
+    const Report& r = run.see(images[i]);
+    EXPECT_EQ(r.query, i);
+    EXPECT_EQ(r.sequence, i);
+    expect_consistent(r, config);
+    EXPECT_EQ(r.outcome == Outcome::kLoop, i >= kViews) << outcome_name(r.outcome);
+    if (r.outcome != Outcome::kLoop || i < kViews) continue;
+    expect_verified(r, config);
+    EXPECT_EQ(r.match->sequence, r.match->image);
+    ASSERT_LT(r.match->image, static_cast<ImageId>(kViews));
+    EXPECT_EQ(lap[r.match->image].wall, lap[i - kViews].wall);
+  }
+  EXPECT_EQ(run.report().images,
+            images.size() - static_cast<std::size_t>(config.loop.waiting_frames) + 1);
+}
+
+TEST(DetectorLaps, SecondLapIsRecognised) { expect_second_lap_recognised(small_config()); }
+
+TEST(DetectorLaps, PointsAloneDo) {
+  Config config = small_config();
+  config.features.lines = 0;
+  expect_second_lap_recognised(config);
+}
+
+TEST(DetectorLaps, LinesAloneDo) {
+  Config config = small_config();
+  config.features.points = 0;
+  expect_second_lap_recognised(config);
+}
+
+TEST(DetectorLaps, ImageZeroIsAMatchLikeAnyOther) {
+  const std::vector<View> lap = walk(kViews);  // wall 0 has a single view
+  TestRun run(small_config());
+  for (const Image& image : laps_of(lap, 1)) run.see(image);
+  const Report& r = run.see(testing::wall_image(lap[0].wall, 4));
+  EXPECT_EQ(r.outcome, Outcome::kLoop);
+  ASSERT_TRUE(r.match.has_value());
+  EXPECT_EQ(r.match->image, 0u);
+  EXPECT_EQ(r.island->first, 0u);
+}
+
+TEST(DetectorLaps, NothingIsAcceptedBelowTheInlierThreshold) {
+  Config config = small_config();
+  config.verify.min_inliers = 10'000;
+  TestRun run(config);
+  int verified = 0;
+  for (const Image& image : laps_of(walk(kViews), 2)) {
+    const Report& r = run.see(image);
+    expect_consistent(r, config);
+    EXPECT_NE(r.outcome, Outcome::kLoop);
+    verified += r.match ? 1 : 0;  // rejected, but the evidence is there
+  }
+  EXPECT_GE(verified, kViews);
+}
+
+TEST(DetectorLaps, ALoopAfterManyIsVerifiedAsWell) {
+  // 25 loops in a row; then a wall seen before, cut into tiles and shuffled: the same words in a
+  // geometry that cannot be.
+  const auto images = laps_of(walk(kViews), 2);
+  TestRun run(small_config());
+  for (std::size_t i = 0; i < kViews + 25; ++i) run.see(images[i]);
+  EXPECT_EQ(run.report().outcome, Outcome::kLoop);
+  const Image wall = images[25];
+  Image shuffled = wall;
+  constexpr int kTile = 40;
+  const int columns = wall.width_px / kTile;
+  const int tiles = columns * (wall.height_px / kTile);
+  for (int y = 0; y < wall.height_px; ++y)
+    for (int x = 0; x < wall.width_px; ++x) {
+      const int tile = (y / kTile * columns + x / kTile) * 29 % tiles;
+      shuffled.at(x, y) =
+          wall.at(tile % columns * kTile + x % kTile, tile / columns * kTile + y % kTile);
+    }
+  const Report& r = run.see(shuffled);
+  EXPECT_NE(r.outcome, Outcome::kLoop) << r.verification->inliers();
+}
+
+TEST(DetectorLaps, FeaturesOfMatchedImagesCanBeRead) {
+  TestRun run(small_config());
+  for (const Image& image : laps_of(walk(kViews), 2)) {
+    const Report& r = run.decide(image);
+    const Features* query = run.detector.features(r.query);
+    ASSERT_NE(query, nullptr);
+    EXPECT_EQ(static_cast<int>(query->points.size()), r.points);
+    EXPECT_EQ(static_cast<int>(query->lines.size()), r.lines);
+    EXPECT_EQ(run.detector.features(r.query + 1), nullptr);
+    if (r.match) {
+      const Features* match = run.detector.features(r.match->image);
+      ASSERT_NE(match, nullptr);
+      EXPECT_EQ(match->points.size(), match->point_descriptors.size());
+      EXPECT_EQ(match->width_px, image.width_px);
+    }
+    run.absorb();
+  }
+}
+
+TEST(DetectorLaps, MapAndBytesGrowWithWhatIsNew) {
+  TestRun run(small_config());
+  std::size_t bytes = run.detector.bytes();
+  for (const Image& image : laps_of(walk(kViews), 1)) {
+    const Report& r = run.see(image);
+    EXPECT_GT(r.bytes, bytes);
+    EXPECT_EQ(r.bytes, run.detector.bytes());
+    bytes = r.bytes;
+  }
+  EXPECT_GT(run.report().words_points, 100u);
+  EXPECT_GT(run.report().words_lines, 100u);
+}
+
+}  // namespace
+}  // namespace loopd
