@@ -22,7 +22,7 @@ bool starts_with(std::span<const std::uint8_t> bytes, std::string_view magic) {
 Error too_large(const ImageSize& size, std::size_t max_pixels) {
   return {"it is " + std::to_string(size.width_px) + "x" + std::to_string(size.height_px) +
               ", more than the " + std::to_string(max_pixels) +
-              " pixels of camera.max_width x camera.max_height; raise these or scale the images",
+              " pixels of camera.max_pixels; raise it or scale the images",
           EFBIG};
 }
 

@@ -18,7 +18,7 @@ Error cannot_read(const std::string& path, int code) {
 
 Error too_long(const std::string& path, std::size_t max_bytes) {
   return {"cannot read " + path + ": it is longer than the " + std::to_string(max_bytes) +
-              " bytes that an image of camera.max_width x camera.max_height can need",
+              " bytes that an image of camera.max_pixels can need",
           EFBIG};
 }
 

@@ -243,7 +243,7 @@ TEST(Decode, TheLimitIsInPixelsAndInclusive) {
   EXPECT_TRUE(decode(file, 1000).ok);
   const Decoded refused = decode(file, 999);
   EXPECT_EQ(refused.error.code, EFBIG);
-  EXPECT_THAT(refused.error.message, HasSubstr("camera.max_width"));
+  EXPECT_THAT(refused.error.message, HasSubstr("camera.max_pixels"));
 }
 
 TEST(Decode, ALargeImageIsReadWhereAllowed) {

@@ -151,7 +151,7 @@ TEST_F(FileCameraTest, ATooLargeImageCostsItsFrameAndNamesTheRemedy) {
     EXPECT_EQ(error.fault, CameraFault::kTooLarge);
     EXPECT_FALSE(error.lost);
     EXPECT_EQ(error.sequence, static_cast<std::uint64_t>(i));
-    EXPECT_THAT(error.message, AllOf(HasSubstr(dir_.string()), HasSubstr("camera.max_width")));
+    EXPECT_THAT(error.message, AllOf(HasSubstr(dir_.string()), HasSubstr("camera.max_pixels")));
   }
   EXPECT_EQ(next_frame(*camera).sequence, 4u);
 }

@@ -86,7 +86,7 @@ TEST_F(VideoDecodeTest, FramesLargerThanThePoolAreRefused) {
   const auto camera =
       open_file_camera({.path = path_, .video_decoder = LOOPD_VIDEO_DECODER}, small);
   ASSERT_FALSE(camera.ok());
-  EXPECT_THAT(camera.error().message, HasSubstr("camera.max_width"));
+  EXPECT_THAT(camera.error().message, HasSubstr("camera.max_pixels"));
 }
 
 }  // namespace
