@@ -164,7 +164,12 @@ TEST_P(FailingStage, DISABLED_LeavesTheMapAsItWas) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Lane, FailingStage,
-                         ::testing::Values(Failing::kPoints, Failing::kLines, Failing::kBoth));
+                         ::testing::Values(Failing::kPoints, Failing::kLines, Failing::kBoth),
+                         [](const auto& param) {
+                           return param.param == Failing::kPoints  ? "Points"
+                                  : param.param == Failing::kLines ? "Lines"
+                                                                   : "Both";
+                         });
 
 TEST(DetectorFailure, EveryFrameMayFail) {
   FailingLanes lanes;

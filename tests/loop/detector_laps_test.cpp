@@ -89,7 +89,7 @@ TEST(DetectorLaps, ImageZeroIsAMatchLikeAnyOther) {
   const std::vector<View> lap = walk(kViews);  // wall 0 has a single view
   TestRun run(small_config());
   for (const Image& image : laps_of(lap, 1)) run.see(image);
-  const Report& r = run.see(testing::wall_image(lap[0].wall, 4));
+  const Report& r = run.see(testing::wall_image(lap[0].wall, 4, 240, 180));
   EXPECT_EQ(r.outcome, Outcome::kLoop);
   ASSERT_TRUE(r.match.has_value());
   EXPECT_EQ(r.match->image, 0u);

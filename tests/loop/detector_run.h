@@ -132,8 +132,8 @@ inline std::vector<View> walk(int views) {
 
 /// Images of `laps` walks: from the second on a few pixels beside the first, all with noise of
 /// their own.
-inline std::vector<Image> laps_of(const std::vector<View>& lap, int laps, int width = 320,
-                                  int height = 240) {
+inline std::vector<Image> laps_of(const std::vector<View>& lap, int laps, int width = 240,
+                                  int height = 180) {
   std::vector<Image> images;
   for (int i = 0; i < laps; ++i)
     for (const View& view : lap)
