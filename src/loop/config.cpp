@@ -72,10 +72,11 @@ const std::array kParameters = {
                       LOOPD_REF(loop.island_gap)},
     Parameter<Config>{"loop.verified_islands", "islands", 1, 16,
                       "The best islands that are verified.", LOOPD_REF(loop.verified_islands)},
-    Parameter<Config>{"loop.verified_images", "images", 1, 16,
-                      "Of each of them, the best images that are verified; the one with the most "
-                      "inliers is the match.",
-                      LOOPD_REF(loop.verified_images)},
+    Parameter<Config>{
+        "loop.verified_images", "images", 1, 16,
+        "Of each of them, the best images that are verified; the most convincing is the "
+        "match.",
+        LOOPD_REF(loop.verified_images)},
     Parameter<Config>{"loop.still_fraction", "of the features found again", 0.01, 1,
                       "The camera has not moved if this share of what it sees again is exactly "
                       "where it was. Noise leaves more than 0.8, a slow hand less than 0.6.",

@@ -16,6 +16,7 @@ inline Report sample_report() {
   Verification verification;
   verification.point_matches = 160;
   verification.line_matches = 40;
+  verification.agreeing = 143;
   verification.point_inliers = 121;
   verification.line_inliers = 22;
   verification.model = Model::kHomography;

@@ -111,7 +111,8 @@ TEST(Verifier, ReportsWhatItCounts) {
     EXPECT_FALSE(line_seen && !p.is_line) << "points come first";
     line_seen |= p.is_line;
   }
-  EXPECT_EQ(points, static_cast<std::size_t>(v.point_inliers));
+  EXPECT_EQ(points, static_cast<std::size_t>(v.agreeing - v.line_inliers));
+  EXPECT_LE(static_cast<std::size_t>(v.point_inliers), points);
   EXPECT_GE(ends, static_cast<std::size_t>(v.line_inliers));
   EXPECT_LE(ends, 2 * static_cast<std::size_t>(v.line_inliers));
   EXPECT_LE(v.point_inliers, v.point_matches);
@@ -132,7 +133,7 @@ TEST(Verifier, PlaneIsAHomography) {
     EXPECT_EQ(v.model, Model::kHomography) << "seed " << seed;
     EXPECT_GE(static_cast<double>(true_point_inliers(scene, pairs)),
               0.9 * static_cast<double>(scene.true_points()));
-    EXPECT_EQ(v.homography_inliers, v.inliers());
+    EXPECT_EQ(v.homography_inliers, v.agreeing);
     const double sign = v.homography[8] * scene.homography[8] > 0 ? 1 : -1;
     // The entries differ by orders of magnitude in pixels: compare what they do to the corners.
     for (const double x : {0.0, 639.0})
@@ -299,8 +300,8 @@ TEST(Verifier, PositionsThatAreNoNumbersAreLeftOut) {
   for (std::size_t i = 0; i < 20; ++i) scene.match.lines[i].end_y_px = bad[i % 3];
   const auto [v, pairs] = verify(scene);
   expect_finite(v);
-  EXPECT_GE(v.point_inliers, 270);
-  EXPECT_LE(v.point_inliers, 300);
+  EXPECT_GE(v.agreeing - v.line_inliers, 270);
+  EXPECT_LE(v.agreeing - v.line_inliers, 300);
   EXPECT_LE(v.line_inliers, 40);
   for (const InlierPair& p : pairs)
     EXPECT_TRUE(std::isfinite(p.query_x_px + p.query_y_px + p.match_x_px + p.match_y_px));
@@ -319,7 +320,27 @@ TEST(Verifier, MorePairsThanTheReportHolds) {
   const Scene scene = make_scene(options);
   const auto [v, pairs] = verify(scene);
   EXPECT_TRUE(pairs.full());
-  EXPECT_GE(v.point_inliers, 4500);
+  EXPECT_GE(v.agreeing, 4500);
+}
+
+// One corner answers on several pyramid levels: the same evidence, however many points it gives.
+TEST(Verifier, CountsAPlaceOnce) {
+  SceneOptions options;
+  options.lines = 0;
+  Scene scene = make_scene(options);
+  const auto [once, pairs] = verify(scene);
+  const std::size_t points = scene.query.points.size();
+  for (std::size_t i = 0; i < points; ++i) {
+    for (Features* f : {&scene.query, &scene.match}) {
+      f->points.push_back(f->points[i]);
+      Descriptor other = f->point_descriptors[i];
+      for (std::uint64_t& word : other.words) word = ~word;  // matches its own twin only
+      f->point_descriptors.push_back(other);
+    }
+  }
+  const auto [twice, twice_pairs] = verify(scene);
+  EXPECT_GE(twice.agreeing, 19 * once.agreeing / 10);
+  EXPECT_LE(twice.point_inliers, 11 * once.point_inliers / 10);
 }
 
 TEST(Verifier, SameSeedSameBits) {
