@@ -39,11 +39,26 @@ class StageTimer {
 constexpr int kMaxStillCredit = 10;                   // frames
 constexpr std::int64_t kMaxFrameNs = 10'000'000'000;  // a longer pause is no time under way
 
+// Time from one frame to the next; none where it is not known or does not advance. Any stamps are
+// answered: a driver may lie.
+std::int64_t time_under_way(std::optional<std::int64_t> before, std::optional<std::int64_t> now) {
+  if (!before || !now || *now <= *before) return 0;
+  const std::uint64_t elapsed =
+      static_cast<std::uint64_t>(*now) - static_cast<std::uint64_t>(*before);
+  return static_cast<std::int64_t>(std::min(elapsed, static_cast<std::uint64_t>(kMaxFrameNs)));
+}
+
 class InlineLanes : public LaneExecutor {
  public:
   void run(const std::function<void()>& points, const std::function<void()>& lines) override {
-    points();
+    std::exception_ptr failure;
+    try {
+      points();
+    } catch (...) {
+      failure = std::current_exception();
+    }
     lines();
+    if (failure) std::rethrow_exception(failure);
   }
 };
 
@@ -98,11 +113,10 @@ class Detector::Impl {
     try {
       describe();
       report.outcome = decide(report);
-    } catch (const std::exception&) {
+    } catch (...) {  // whatever failed costs this frame only: it decides nothing and is not kept
+      forget_evidence(report);
       report.outcome = Outcome::kError;
-      report.match.reset();
-      report.verification.reset();
-      report.pairs.clear();
+      pending_ = false;
     }
     priority_ = report.outcome == Outcome::kLoop ? report.island : std::nullopt;
   }
@@ -125,7 +139,7 @@ class Detector::Impl {
     try {
       if (std::exchange(pending_, false)) keep(report);
       admit_ready();
-    } catch (const std::exception&) {
+    } catch (...) {  // made up for by the next absorb()
       report.outcome = report.outcome == Outcome::kLoop ? Outcome::kLoop : Outcome::kError;
     }
     report.words_points = point_words_.words();
@@ -152,6 +166,16 @@ class Detector::Impl {
     Verification found;
     InlierPairs pairs;
   };
+
+  static void forget_evidence(Report& report) {
+    report.point_candidates.clear();
+    report.line_candidates.clear();
+    report.fused.clear();
+    report.island.reset();
+    report.match.reset();
+    report.verification.reset();
+    report.pairs.clear();
+  }
 
   // 1
   void describe(const LumaView& image) {
@@ -185,17 +209,16 @@ class Detector::Impl {
     report.still = newest != nullptr && stillness_.is_still(newest->features, features_);
     pending_ = !report.still;
 
-    const auto elapsed_ns = report.time_ns && last_time_ns_ && *report.time_ns > *last_time_ns_
-                                ? *report.time_ns - *last_time_ns_
-                                : 0;
+    const std::int64_t elapsed_ns = time_under_way(last_time_ns_, report.time_ns);
     last_time_ns_ = report.time_ns;
-    still_credit_ = std::min(kMaxStillCredit, still_credit_ + (report.still ? -1 : 1));
+    const int most = std::min(kMaxStillCredit, config_.loop.waiting_frames / 2);
+    still_credit_ = std::min(most, still_credit_ + (report.still ? -1 : 1));
     if (still_credit_ < 0) {
       still_credit_ = 0;
       return;
     }
     ++clock_.frames;
-    clock_.ns += std::min(elapsed_ns, kMaxFrameNs);
+    clock_.ns += elapsed_ns;
   }
 
   void search(Report& report) {
@@ -287,10 +310,19 @@ class Detector::Impl {
     for (int i = 0; i < 2; ++i) {
       const MapImage* image = map_.ready(next);
       if (image == nullptr) return;
-      lanes_.run([&] { point_words_.add(image->id, image->features.point_descriptors); },
-                 [&] { line_words_.add(image->id, image->features.line_descriptors); });
+      lanes_.run(
+          [&] { add_once(point_words_, *image, image->features.point_descriptors, in_points_); },
+          [&] { add_once(line_words_, *image, image->features.line_descriptors, in_lines_); });
       map_.admit();
     }
+  }
+
+  // If one lane fails, the image waits and the next attempt adds it only where it is missing.
+  static void add_once(Vocabulary& words, const MapImage& image,
+                       const std::vector<Descriptor>& descriptors, std::optional<ImageId>& newest) {
+    if (newest == image.id) return;
+    words.add(image.id, descriptors);
+    newest = image.id;
   }
 
   Config config_;
@@ -308,6 +340,8 @@ class Detector::Impl {
   Features features_;     // of the newest frame
   bool pending_ = false;  // the newest frame waits for absorb() to keep it
   std::optional<std::int64_t> last_time_ns_;
+  std::optional<ImageId> in_points_;  // the newest image of each vocabulary
+  std::optional<ImageId> in_lines_;
   int still_credit_ = 0;
   WaitingClock clock_;
   std::optional<Island> priority_;

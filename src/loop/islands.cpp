@@ -11,7 +11,8 @@ struct Growing {
   std::uint32_t last = 0;
   ImageId first_image = 0;
   ImageId last_image = 0;
-  PlacedCandidate best;
+  PlacedCandidate best;  // the first to join, since candidates come best first
+  std::uint32_t images = 0;
   double sum = 0;
 };
 
@@ -23,7 +24,8 @@ std::vector<Growing> seed_islands(std::span<const PlacedCandidate> candidates, s
     const bool covered = std::any_of(islands.begin(), islands.end(), [&](const Growing& island) {
       return distance(island.seed, c.position) <= gap;
     });
-    if (!covered) islands.push_back({c.position, c.position, c.position, c.image, c.image, c, 0.0});
+    if (!covered)
+      islands.push_back({c.position, c.position, c.position, c.image, c.image, c, 0, 0.0});
   }
   return islands;
 }
@@ -37,6 +39,7 @@ void join(Growing& island, const PlacedCandidate& c) {
     island.last = c.position;
     island.last_image = c.image;
   }
+  if (island.images++ == 0) island.best = c;
   island.sum += c.score;
 }
 

@@ -22,7 +22,7 @@ void ImageMap::push(MapImage image) {
 }
 
 const MapImage* ImageMap::ready(const WaitingClock& next) const {
-  if (waiting_.empty()) return nullptr;
+  if (waiting_.size() < 2) return nullptr;  // the newest shows where the camera is
   const MapImage& oldest = waiting_.front();
   if (next.frames - oldest.taken.frames < config_.waiting_frames) return nullptr;
   const auto waiting_ns = static_cast<std::int64_t>(config_.waiting_s * 1e9);

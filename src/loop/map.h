@@ -36,7 +36,8 @@ class ImageMap {
 
   /// Puts an image at the end of the waiting window. Ids and times grow.
   void push(MapImage image);
-  /// The oldest waiting image if a frame taken at `next` may find it, else null.
+  /// The oldest waiting image if a frame taken at `next` may find it, else null. Never the newest
+  /// image kept: the camera has not moved away from it.
   const MapImage* ready(const WaitingClock& next) const;
   /// Makes that image searchable. Precondition: ready() was not null.
   void admit();

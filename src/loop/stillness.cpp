@@ -13,10 +13,16 @@ constexpr float kSearchRadius = 8;    // in units of still_radius_px
 constexpr float kFinestPatchPx = 31;  // of a point on the finest pyramid level
 constexpr double kMinFound = 0.15;    // of the poorer image's features; fewer tell nothing
 constexpr float kCellPx = 16;
+constexpr int kMaxCells = 512;  // along a side
 
+// The last cell holds all that lies beyond it; no number (NaN) goes to the first.
 int cell_index(float position_px, int cells) {
-  return std::clamp(static_cast<int>(position_px / kCellPx), 0, cells - 1);
+  const float cell = position_px / kCellPx;
+  if (!(cell > 0)) return 0;
+  return cell < static_cast<float>(cells) ? static_cast<int>(cell) : cells - 1;
 }
+
+int cells_of(int side_px) { return std::min(side_px / static_cast<int>(kCellPx) + 1, kMaxCells); }
 
 struct Middle {
   float x = 0;
@@ -40,6 +46,7 @@ float offset_across(const Line& old, const Line& line) {
 
 bool StillnessTest::is_still(const Features& before, const Features& now) {
   if (before.width_px != now.width_px || before.height_px != now.height_px) return false;
+  if (now.width_px < 1 || now.height_px < 1) return false;
   const Tally points = tally_points(before, now);
   const Tally lines = tally_lines(before, now);
   const auto poorer = static_cast<double>(
@@ -50,8 +57,8 @@ bool StillnessTest::is_still(const Features& before, const Features& now) {
 }
 
 void StillnessTest::sort_into_cells(const Features& before) {
-  columns_ = static_cast<int>(static_cast<float>(before.width_px) / kCellPx) + 1;
-  rows_ = static_cast<int>(static_cast<float>(before.height_px) / kCellPx) + 1;
+  columns_ = cells_of(before.width_px);
+  rows_ = cells_of(before.height_px);
   const auto cells = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
   const auto cell_of = [this](const Point& p) {
     return static_cast<std::size_t>(cell_index(p.y_px, rows_) * columns_ +

@@ -62,6 +62,8 @@ void measure_spread(const InlierPairs& pairs, const Features& query, Verificatio
 // Points among the inliers whose places are new in both images; see Verification::point_inliers.
 int count_distinct_points(const InlierPairs& pairs, const Features& query,
                           const Features& candidate) {
+  if (std::min(query.width_px, query.height_px) < 1) return 0;
+  if (std::min(candidate.width_px, candidate.height_px) < 1) return 0;
   std::bitset<kDistinctCells * kDistinctCells> in_query, in_candidate;
   const auto place = [](float x, float y, const Features& image) {
     return static_cast<std::size_t>(cell_of(y, image.height_px, kDistinctCells) * kDistinctCells +

@@ -121,10 +121,10 @@ TEST_F(Failure, OfBothWhileDescribingLeavesNoTrace) { fail_while_describing(Fail
 TEST_F(Failure, OfBothWhileAbsorbingIsMadeUpForLater) {
   fail_while_absorbing(images_[kFailed], Outcome::kLoop, Outcome::kLoop, Failing::kBoth);
 }
-TEST_F(Failure, DISABLED_OfPointsWhileAbsorbingIsMadeUpForLater) {
+TEST_F(Failure, OfPointsWhileAbsorbingIsMadeUpForLater) {
   fail_while_absorbing(images_[kFailed], Outcome::kLoop, Outcome::kLoop, Failing::kPoints);
 }
-TEST_F(Failure, DISABLED_OfLinesWhileAbsorbingIsMadeUpForLater) {
+TEST_F(Failure, OfLinesWhileAbsorbingIsMadeUpForLater) {
   fail_while_absorbing(images_[kFailed], Outcome::kLoop, Outcome::kLoop, Failing::kLines);
 }
 
@@ -139,7 +139,7 @@ TEST_F(Failure, WhileAbsorbingAFrameWithoutALoopIsAnError) {
 // Whatever stage of process() fails, the frame is an error and the map is as it was.
 class FailingStage : public ::testing::TestWithParam<Failing> {};
 
-TEST_P(FailingStage, DISABLED_LeavesTheMapAsItWas) {
+TEST_P(FailingStage, LeavesTheMapAsItWas) {
   const auto images = laps_of(walk(static_cast<int>(kViews)), 2);
   int stages = 0;
   for (int stage = 1; stages < stage; ++stage) {  // ends with the first that is not there

@@ -157,7 +157,7 @@ TEST(DetectorHostile, FeaturesOfAnEmptyImage) {
   expect_answered(odd, "size 0 x 0");
 }
 
-TEST(DetectorHostile, DISABLED_FeaturesOfAnImageOfNegativeSize) {
+TEST(DetectorHostile, FeaturesOfAnImageOfNegativeSize) {
   Features odd = described(1);
   odd.width_px = odd.height_px = -1000;
   expect_answered(odd, "negative size");

@@ -155,7 +155,7 @@ double score_of(ImageId image, const std::vector<PlacedCandidate>& candidates) {
   return it == candidates.end() ? -1.0 : it->score;
 }
 
-TEST(BuildIslands, DISABLED_BestImageHasTheHighestScoreOfItsIsland) {
+TEST(BuildIslands, BestImageHasTheHighestScoreOfItsIsland) {
   std::mt19937 random(6);
   for (int round = 0; round < 1000; ++round) {
     const auto candidates = random_candidates(random);

@@ -39,6 +39,7 @@ TEST(ImageMap, IsEmptyAtFirst) {
 TEST(ImageMap, HoldsAnImageBackForTheGivenNumberOfFrames) {
   ImageMap map(waiting(3, 0));
   map.push(image(0, 1));
+  map.push(image(1, 2));
   EXPECT_EQ(map.ready({2, 0}), nullptr);
   EXPECT_EQ(map.ready({3, 0}), nullptr);
   ASSERT_NE(map.ready({4, 0}), nullptr);
@@ -48,6 +49,7 @@ TEST(ImageMap, HoldsAnImageBackForTheGivenNumberOfFrames) {
 TEST(ImageMap, HoldsAnImageBackForTheGivenTimeWhereTimesAreKnown) {
   ImageMap map(waiting(1, 15.0));
   map.push(image(0, 1, 2 * kSecond, 1000 * kSecond));
+  map.push(image(1, 2, 3 * kSecond, 1001 * kSecond));
   EXPECT_EQ(map.ready({100, 17 * kSecond - 1}), nullptr);
   EXPECT_NE(map.ready({100, 17 * kSecond}), nullptr);
 }
@@ -55,6 +57,7 @@ TEST(ImageMap, HoldsAnImageBackForTheGivenTimeWhereTimesAreKnown) {
 TEST(ImageMap, WantsBothFramesAndTime) {
   ImageMap map(waiting(10, 5.0));
   map.push(image(0, 1, 0, 0));
+  map.push(image(1, 2, 1, 1));
   EXPECT_EQ(map.ready({11, 5 * kSecond - 1}), nullptr);
   EXPECT_EQ(map.ready({10, 5 * kSecond}), nullptr);
   EXPECT_NE(map.ready({11, 5 * kSecond}), nullptr);
@@ -63,7 +66,16 @@ TEST(ImageMap, WantsBothFramesAndTime) {
 TEST(ImageMap, CountsFramesAloneWhereTimesAreUnknown) {
   ImageMap map(waiting(2, 15.0));
   map.push(image(0, 1));
+  map.push(image(1, 2));
   EXPECT_NE(map.ready({3, 0}), nullptr);
+}
+
+TEST(ImageMap, NeverAdmitsTheNewestImageKept) {
+  ImageMap map(waiting(1, 0));
+  map.push(image(0, 1));
+  EXPECT_EQ(map.ready({1000, 0}), nullptr);
+  map.push(image(1, 1000));
+  EXPECT_NE(map.ready({1001, 0}), nullptr);
 }
 
 TEST(ImageMap, AdmitsTheOldestFirst) {
