@@ -51,7 +51,8 @@ struct VerifyConfig {
   bool line_angle_filter = true;
   double epipolar_px = 2.0;
   int max_iterations = 1000;
-  int min_inliers = 40;
+  int min_inliers = 35;
+  double min_agreement = 0.65;
   int seed = 1;
 };
 

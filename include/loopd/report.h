@@ -21,6 +21,7 @@ enum class Outcome : std::uint8_t {
   kNoCandidates,  ///< no earlier image is similar
   kFewMatches,    ///< the best candidate has too few matching points and lines
   kFewInliers,    ///< no epipolar geometry or homography holds for enough of them
+  kContradicted,  ///< enough inliers, but too many of the matches disagree with them
   kError,         ///< processing this frame failed; the map is unchanged
 };
 

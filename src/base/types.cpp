@@ -17,6 +17,8 @@ std::string_view outcome_name(Outcome outcome) {
       return "few_matches";
     case Outcome::kFewInliers:
       return "few_inliers";
+    case Outcome::kContradicted:
+      return "contradicted";
     case Outcome::kError:
       return "error";
   }

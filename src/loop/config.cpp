@@ -119,6 +119,12 @@ const std::array kParameters = {
                       "Fewer, in distinct places, are no loop. On the real sequences measured no "
                       "false candidate has more than 30.",
                       LOOPD_REF(verify.min_inliers)},
+    Parameter<Config>{
+        "verify.min_agreement", "of all matches", 0, 1,
+        "And at least this share of the matches must fit: look-alikes share parts of a "
+        "view, the rest contradicts. Halves the false loops between mirrored rooms, "
+        "costs 7 % recall where views overlap little.",
+        LOOPD_REF(verify.min_agreement)},
     Parameter<Config>{"verify.seed", "", 0, 2'147'483'647,
                       "Seed of the random sampling: the same seed gives the same decisions.",
                       LOOPD_REF(verify.seed)},

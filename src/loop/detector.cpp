@@ -293,6 +293,8 @@ class Detector::Impl {
   Outcome judge(const Verification& found) const {
     if (found.matches() < config_.verify.min_inliers) return Outcome::kFewMatches;
     if (found.inliers() < config_.verify.min_inliers) return Outcome::kFewInliers;
+    if (found.agreeing < config_.verify.min_agreement * found.matches())
+      return Outcome::kContradicted;
     return Outcome::kLoop;
   }
 

@@ -169,5 +169,26 @@ TEST(DetectorLaps, MapAndBytesGrowWithWhatIsNew) {
   EXPECT_GT(run.report().words_lines, 100u);
 }
 
+// The share of the matches that fits decides beside their number: the same laps with nothing less
+// than full agreement lose exactly the loops that some match contradicts.
+TEST(DetectorLaps, AMatchThatManyOthersContradictIsNoLoop) {
+  const std::vector<Image> images = laps_of(walk(12), 2);
+  TestRun lenient(small_config());
+  Config strict_config = small_config();
+  strict_config.verify.min_agreement = 1.0;
+  TestRun strict(strict_config);
+  int contradicted = 0;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    const Report& r = strict.see(images[i]);
+    const Outcome before = lenient.see(images[i]).outcome;
+    if (before != Outcome::kLoop) continue;
+    ASSERT_TRUE(r.verification);
+    const bool full = r.verification->agreeing == r.verification->matches();
+    EXPECT_EQ(r.outcome, full ? Outcome::kLoop : Outcome::kContradicted) << "frame " << i;
+    contradicted += full ? 0 : 1;
+  }
+  EXPECT_GT(contradicted, 0);
+}
+
 }  // namespace
 }  // namespace loopd

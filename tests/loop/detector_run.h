@@ -41,6 +41,7 @@ inline Config small_config() {
   config.verify.epipolar_px = 2.0;
   config.verify.max_iterations = 200;
   config.verify.min_inliers = 20;
+  config.verify.min_agreement = 0.3;
   config.verify.seed = 1;
   return config;
 }
