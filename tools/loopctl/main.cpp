@@ -14,7 +14,7 @@ using namespace loopd;
 
 struct SocketChoice {
   std::string path;
-  std::string camera = "camera";
+  std::string camera = "front";
 };
 
 void add_socket_options(CLI::App& command, SocketChoice& choice) {
