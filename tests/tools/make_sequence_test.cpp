@@ -19,6 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 using loopd::testing::TempDir;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 SequenceOptions small_options() {
   SequenceOptions o;
@@ -236,12 +237,13 @@ TEST(MakeSequence, NamesEveryViolation) {
   o.width_px = 0;
   o.fov_deg = std::nan("");
   o.texture = 1.5;
+  o.sameness = -0.5;
   o.jpeg_quality = 101;
   const TempDir dir;
   const Status status = write_sequence(o, dir / "s", 1, {});
   ASSERT_FALSE(status.ok());
-  for (const char* name :
-       {"frames = -1", "width = 0", "fov = nan", "texture = 1.5", "jpeg-quality = 101"}) {
+  for (const char* name : {"frames = -1", "width = 0", "fov = nan", "texture = 1.5",
+                           "sameness = -0.5", "jpeg-quality = 101"}) {
     EXPECT_THAT(status.error().message, HasSubstr(name));
   }
   EXPECT_FALSE(fs::exists(dir / "s"));
@@ -295,10 +297,12 @@ TEST(MakeSequenceTool, RendersAndReportsProgress) {
   const TempDir dir;
   const auto [code, text] = run_tool("--out " + (dir / "s").string() +
                                      " --frames 26 --step 2 --width 32 --height 24 --texture 0.3"
-                                     " --lap-change --format jpg --threads 2");
+                                     " --lap-change --format jpg --threads 2 --sameness 0.5");
   EXPECT_EQ(code, 0) << text;
-  EXPECT_THAT(text, HasSubstr("26 of 26 images"));
+  EXPECT_THAT(text, HasSubstr("26 of 26 images\n"));
+  EXPECT_THAT(text, Not(HasSubstr("\r"))) << "a log is no terminal";
   EXPECT_TRUE(fs::exists(dir / "s/images/000025.jpg"));
+  EXPECT_EQ(nlohmann::json::parse(slurp(dir / "s/info.json"))["options"]["sameness"], 0.5);
 }
 
 TEST(MakeSequenceTool, HostileOptionsGiveClearErrors) {

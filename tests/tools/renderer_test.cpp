@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "make_sequence/picture.h"
 #include "make_sequence/random.h"
@@ -180,6 +181,107 @@ TEST(Scene, TextureFadesPointsAndKeepsStructure) {
     EXPECT_EQ(rich.boxes[i].lo.x, bare.boxes[i].lo.x);
     EXPECT_EQ(rich.boxes[i].hi.z, bare.boxes[i].hi.z);
   }
+}
+
+TEST(LegStyle, SamenessDrawsEveryValueTowardsTheCommonOne) {
+  const LegStyle common;
+  const auto values = [](const LegStyle& s) {
+    return std::vector<double>{
+        s.bay_m,          s.pillar_m,         s.pillar_depth_m, s.lamp_pitch_m,    s.lamp_aside_m,
+        s.skirting_m,     s.rail_z_m,         s.door_height_m,  s.door_tone,       s.wall_tone,
+        s.floor.size_x_m, s.ceiling.size_y_m, s.ceiling.x0_m,   s.grain.stretch_u, s.grain.u0_m};
+  };
+  for (std::size_t leg = 0; leg < 6; ++leg) {
+    const auto own = values(make_leg_style(7, leg, 0));
+    const auto half = values(make_leg_style(7, leg, 0.5));
+    const auto next = values(make_leg_style(7, leg + 1, 0));
+    EXPECT_EQ(values(make_leg_style(7, leg, 1)), values(common));
+    EXPECT_EQ(values(make_leg_style(7, leg, 0)), own);
+    for (std::size_t i = 0; i < own.size(); ++i) {
+      const double to_own = std::abs(own[i] - values(common)[i]);
+      EXPECT_LT(std::abs(half[i] - values(common)[i]), to_own) << "leg " << leg << ", value " << i;
+      EXPECT_NE(own[i], next[i]) << "leg " << leg << ", value " << i;
+    }
+  }
+}
+
+TEST(LegMap, EveryPlaceOfTheFloorBelongsToItsLeg) {
+  Random random(9);
+  const auto corners = make_floor_plan(300, 1.0, random);
+  const LegMap map(corners, 2.2);
+  const std::size_t n = corners.size();
+  for (std::size_t leg = 0; leg < n; ++leg) {
+    const Vec3 along = corners[(leg + 1) % n] - corners[leg];
+    const double length = std::abs(along.x) + std::abs(along.y);
+    const Vec3 ahead = (1 / length) * along;
+    const Vec3 left{-ahead.y, ahead.x, 0};
+    for (double s = 1.15; s < length + 1.1; s += 0.2) {
+      for (const double aside : {-1.05, 0.0, 1.05}) {
+        const Vec3 p = corners[leg] + s * ahead + aside * left;
+        ASSERT_EQ(map.leg_at(p.x, p.y), leg) << s << " m along, " << aside << " m aside";
+      }
+    }
+  }
+  EXPECT_LT(map.leg_at(1e6, -1e6), n);
+  EXPECT_EQ(LegMap().leg_at(0, 0), 0U);
+}
+
+/// Distances from pillar to pillar along a wall; pillars are its boxes from floor to ceiling that
+/// are wider than a duct.
+std::vector<double> bay_pitches(const Scene& scene, const Wall& wall) {
+  std::vector<double> centres;
+  for (const Box& box : scene.boxes) {
+    const bool x_plane = wall.axis == 0;
+    const double near =
+        wall.facing > 0 ? (x_plane ? box.lo.x : box.lo.y) : (x_plane ? box.hi.x : box.hi.y);
+    const double lo = x_plane ? box.lo.y : box.lo.x;
+    const double hi = x_plane ? box.hi.y : box.hi.x;
+    const bool on_wall = near == wall.at && lo >= wall.lo && hi <= wall.hi;
+    if (on_wall && box.lo.z == 0 && box.hi.z == scene.height_m && hi - lo > 0.1) {
+      centres.push_back((lo + hi) / 2);
+    }
+  }
+  std::sort(centres.begin(), centres.end());
+  std::vector<double> pitches;
+  for (std::size_t i = 1; i < centres.size(); ++i) pitches.push_back(centres[i] - centres[i - 1]);
+  return pitches;
+}
+
+TEST(Scene, BaysRepeatWithinALegAndDifferBetweenLegsByTheSameness) {
+  for (const double sameness : {0.0, 0.3, 1.0}) {
+    const Scene scene = build_scene({120, 1, false, 4, sameness});
+    std::vector<double> of_legs;
+    for (const Wall& wall : scene.walls) {
+      const auto pitches = bay_pitches(scene, wall);
+      for (const double pitch : pitches) {
+        EXPECT_NEAR(pitch, scene.legs[wall.leg].bay_m, 1e-9) << "leg " << wall.leg;
+      }
+      if (!pitches.empty()) of_legs.push_back(pitches.front());
+    }
+    ASSERT_GE(of_legs.size(), 6U);
+    const auto [least, most] = std::minmax_element(of_legs.begin(), of_legs.end());
+    if (sameness == 1) {
+      EXPECT_NEAR(*most, *least, 1e-9);
+    } else {
+      EXPECT_GT(*most - *least, 0.3);
+    }
+  }
+}
+
+TEST(Scene, SamenessLeavesTheWayRoundAlone) {
+  SequenceOptions options = small_options();
+  options.sameness = 0;
+  const Sequence own(options);
+  options.sameness = 1;
+  const Sequence copies(options);
+  ASSERT_EQ(own.plan().size(), copies.plan().size());
+  for (std::size_t i = 0; i < own.plan().size(); ++i) {
+    EXPECT_EQ(own.plan()[i].pose.position.x, copies.plan()[i].pose.position.x);
+    EXPECT_EQ(own.plan()[i].pose.forward.y, copies.plan()[i].pose.forward.y);
+  }
+  FrameRenderer a(own);
+  FrameRenderer b(copies);
+  EXPECT_NE(a.render(5), b.render(5));
 }
 
 }  // namespace

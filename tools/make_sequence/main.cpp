@@ -1,5 +1,8 @@
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <iostream>
 #include <string>
@@ -23,6 +26,8 @@ void add_options(CLI::App& app, SequenceOptions& o) {
   app.add_option("--loop", o.loop_m, "metres once round, in place of --laps")->excludes(laps);
   app.add_option("--seed", o.seed, "of building, walk and noise");
   app.add_option("--texture", o.texture, "0..1: posters, plates, marks, grain, tiles; lines stay");
+  app.add_option("--sameness", o.sameness,
+                 "0..1: how alike the legs' bays, lamps, tiles and tones are; 1 = exact copies");
   app.add_option("--noise", o.noise, "sensor noise, standard deviation in grey levels");
   app.add_option("--blur", o.blur_px, "lens blur, standard deviation in pixels");
   app.add_option("--exposure", o.exposure, "amplitude of the slow gain drift, 0..0.9");
@@ -41,11 +46,25 @@ void add_options(CLI::App& app, SequenceOptions& o) {
       ->check(CLI::IsMember({"png", "jpg"}));
 }
 
-void show_progress(std::size_t done, std::size_t total) {
-  if (done % 20 != 0 && done != total) return;
-  std::fprintf(stderr, "\rmake_sequence: %zu of %zu images%s", done, total,
-               done == total ? "\n" : "");
-}
+/// Reports rendered images on stderr: in place on a terminal, else a line now and then and one at
+/// the end. Thread: calls one at a time.
+class Progress {
+ public:
+  void operator()(std::size_t done, std::size_t total) {
+    const auto now = std::chrono::steady_clock::now();
+    const bool last = done == total;
+    if (!last && now - shown_ < (terminal_ ? kRedraw : kLogLine)) return;
+    shown_ = now;
+    std::fprintf(stderr, "%smake_sequence: %zu of %zu images%s", terminal_ ? "\r" : "", done, total,
+                 last || !terminal_ ? "\n" : "");
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kRedraw{200};
+  static constexpr std::chrono::milliseconds kLogLine{10'000};
+  bool terminal_ = isatty(STDERR_FILENO) == 1;
+  std::chrono::steady_clock::time_point shown_ = std::chrono::steady_clock::now();
+};
 
 }  // namespace
 
@@ -59,7 +78,7 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads, "rendering threads")->check(CLI::Range(1, 64));
   add_options(app, options);
   CLI11_PARSE(app, argc, argv);
-  const auto status = loopd::sequence::write_sequence(options, out, threads, show_progress);
+  const auto status = loopd::sequence::write_sequence(options, out, threads, Progress());
   if (!status) {
     std::cerr << "make_sequence: " << status.error().message << '\n';
     return 1;

@@ -15,7 +15,6 @@ constexpr double kNear = 0.02;
 constexpr double kFar = 1e9;
 constexpr int kGrainSize = 512;
 constexpr double kGrainTexelM = 0.005;
-constexpr double kTileM = 0.6;
 
 /// Share of [x - half, x + half] inside [lo, hi].
 double coverage(double x, double half, double lo, double hi) {
@@ -33,6 +32,12 @@ double comb_integral(double x, double period, double width) {
 double seams(double x, double half, double period, double width) {
   return (comb_integral(x + half, period, width) - comb_integral(x - half, period, width)) /
          (2 * half);
+}
+
+/// Share of the rectangle of half sizes (half_x, half_y) round `p` covered by seams of `width`.
+double tile_seams(const Tiling& tiles, const Vec3& p, double half_x, double half_y, double width) {
+  return 1 - (1 - seams(p.x - tiles.x0_m, half_x, tiles.size_x_m, width)) *
+                 (1 - seams(p.y - tiles.y0_m, half_y, tiles.size_y_m, width));
 }
 
 double blend(double from, double to, double share) { return from + share * (to - from); }
@@ -268,13 +273,13 @@ double Renderer::light_at(const Vec3& p) const {
 }
 
 /// Noise at (u, v) metres for a footprint of half size `size`, fading as blotches become small.
-double Renderer::grain_at(double u, double v, double size) const {
+double Renderer::grain_at(const GrainStyle& style, double u, double v, double size) const {
   std::size_t level = 0;
   double texel = kGrainTexelM;
   for (; texel < 2 * size && level + 1 < grain_.size(); texel *= 2) ++level;
   const int n = kGrainSize >> level;
-  const double x = u / texel;
-  const double y = v / texel;
+  const double x = (u * style.stretch_u + style.u0_m) / texel;
+  const double y = (v * style.stretch_v + style.v0_m) / texel;
   const double x_floor = std::floor(x);
   const double y_floor = std::floor(y);
   const auto wrap = [n](double i) {
@@ -296,12 +301,16 @@ double Renderer::shade_wall(const Wall& wall, std::size_t index, const Vec3& p,
                             const Footprint& f) const {
   const double u = wall.u_sign() * (wall.axis == 0 ? p.y : p.x);
   const double half_u = wall.axis == 0 ? f.y : f.x;
+  const LegStyle& leg = scene_.legs[wall.leg];
   double value = wall.albedo;
   if (scene_.grain > 0) {
     value += scene_.grain * 5 *
-             grain_at(u + 7.3 * static_cast<double>(index), p.z, std::max(half_u, f.z));
+             grain_at(leg.grain, u + 7.3 * static_cast<double>(index), p.z, std::max(half_u, f.z));
   }
-  if (wall.rail) value = blend(value, 120, coverage(p.z, f.z, 0.88, 1.0));
+  if (wall.rail) {
+    const double share = coverage(p.z, f.z, leg.rail_z_m, leg.rail_z_m + leg.rail_m);
+    value = blend(value, 120 + leg.rail_tone, share);
+  }
   const DecalBuckets& decals = decals_[index];
   const auto last = static_cast<double>(decals.buckets.size() - 1);
   const auto bucket = static_cast<std::size_t>(std::clamp((u - decals.u0) / kBucketM, 0.0, last));
@@ -312,8 +321,9 @@ double Renderer::shade_wall(const Wall& wall, std::size_t index, const Vec3& p,
     const Picture& picture = scene_.pictures[decal->picture];
     const double sx = picture.width() / (decal->u1 - decal->u0);
     const double sy = picture.height() / (decal->z1 - decal->z0);
-    const double grey = picture.mean((u - half_u - decal->u0) * sx, (decal->z1 - p.z - f.z) * sy,
-                                     (u + half_u - decal->u0) * sx, (decal->z1 - p.z + f.z) * sy);
+    const double grey =
+        decal->tone + picture.mean((u - half_u - decal->u0) * sx, (decal->z1 - p.z - f.z) * sy,
+                                   (u + half_u - decal->u0) * sx, (decal->z1 - p.z + f.z) * sy);
     value = decal->multiply ? value * (1 - share * (1 - grey / 255)) : blend(value, grey, share);
   }
   // Skirting, broken only by doors, which stand on the floor and are drawn over it.
@@ -321,8 +331,9 @@ double Renderer::shade_wall(const Wall& wall, std::size_t index, const Vec3& p,
       decals.buckets[bucket].begin(), decals.buckets[bucket].end(),
       [u](const Decal* decal) { return decal->z0 <= 0 && u > decal->u0 && u < decal->u1; });
   if (!at_door) {
-    value = blend(value, 88, coverage(p.z, f.z, 0, 0.1));
-    value = blend(value, 225, coverage(p.z, f.z, 0.1, 0.112));
+    const double top = leg.skirting_m;
+    value = blend(value, 88 + leg.skirting_tone, coverage(p.z, f.z, 0, top));
+    value = blend(value, 225, coverage(p.z, f.z, top, top + 0.012));
   }
   const double top = scene_.height_m - p.z;
   const double corners = 1 - 0.25 / (1 + 120 * p.z * p.z) - 0.2 / (1 + 80 * top * top);
@@ -349,21 +360,26 @@ double Renderer::shade_box(int surface, const Vec3& p, const Footprint& f) const
 }
 
 double Renderer::shade_floor(const Vec3& p, const Footprint& f) const {
-  const double i = std::floor(p.x / kTileM);
-  const double j = std::floor(p.y / kTileM);
+  const LegStyle& leg = scene_.legs[scene_.leg_map.leg_at(p.x, p.y)];
+  const Tiling& tiles = leg.floor;
+  const double x = p.x - tiles.x0_m;
+  const double y = p.y - tiles.y0_m;
+  const double i = std::floor(x / tiles.size_x_m);
+  const double j = std::floor(y / tiles.size_y_m);
   const double tile = hash_unit(static_cast<std::int64_t>(i), static_cast<std::int64_t>(j)) - 0.5;
   double value = 112;
   // A tile's own tone fades as the footprint grows past a tile.
   const double size = std::max(f.x, f.y);
-  value += 10 * scene_.seams * tile * std::clamp(1.5 - 3 * size / kTileM, 0.0, 1.0);
-  if (scene_.grain > 0) value += scene_.grain * 7 * grain_at(p.x, p.y, size);
-  const double seam =
-      1 - (1 - seams(p.x, f.x, kTileM, 0.008)) * (1 - seams(p.y, f.y, kTileM, 0.008));
+  const double least = std::min(tiles.size_x_m, tiles.size_y_m);
+  value += 10 * scene_.seams * tile * std::clamp(1.5 - 3 * size / least, 0.0, 1.0);
+  if (scene_.grain > 0) value += scene_.grain * 7 * grain_at(leg.grain, p.x, p.y, size);
+  const double seam = tile_seams(tiles, p, f.x, f.y, 0.008);
   return blend(value, 65, scene_.seams * seam) * light_at(p) * 0.95;
 }
 
 double Renderer::shade_ceiling(const Vec3& p, const Footprint& f) const {
-  const double seam = 1 - (1 - seams(p.x, f.x, kTileM, 0.02)) * (1 - seams(p.y, f.y, kTileM, 0.02));
+  const Tiling& panels = scene_.legs[scene_.leg_map.leg_at(p.x, p.y)].ceiling;
+  const double seam = tile_seams(panels, p, f.x, f.y, 0.02);
   double value = blend(205, 150, scene_.seams * seam) * (0.52 + 0.36 * light_at(p));
   const int c = static_cast<int>((p.x - lamp_x0_) / kLampCellM);
   const int r = static_cast<int>((p.y - lamp_y0_) / kLampCellM);

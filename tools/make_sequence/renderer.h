@@ -69,7 +69,7 @@ class Renderer {
   double shade_floor(const Vec3& p, const Footprint& f) const;
   double shade_ceiling(const Vec3& p, const Footprint& f) const;
   double light_at(const Vec3& p) const;
-  double grain_at(double u, double v, double size) const;
+  double grain_at(const GrainStyle& style, double u, double v, double size) const;
   double sample(double x_px, double y_px, double scale) const;
   void smooth_edges(Radiance& out);
 

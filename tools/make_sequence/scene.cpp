@@ -10,9 +10,8 @@
 namespace loopd::sequence {
 namespace {
 
-constexpr double kBayM = 3.6;  // pillar to pillar: bays repeat exactly
-constexpr double kPillarM = 0.36;
-constexpr double kPillarDepthM = 0.12;
+// Of the pictures drawn; on the wall they are stretched to the leg's doors.
+constexpr double kDoorWidthM = 0.95;
 constexpr double kDoorHeightM = 2.08;
 constexpr int kDoorStyles = 4;
 
@@ -23,7 +22,7 @@ class Builder {
       : scene_(scene), random_(mix64(options.seed ^ 0x5ce7eULL)), texture_(options.texture) {
     for (int style = 0; style < kDoorStyles; ++style) {
       for (int right = 0; right < 2; ++right) {
-        door_pictures_[style][right] = add(draw_door(style, right == 1, 0.95, kDoorHeightM));
+        door_pictures_[style][right] = add(draw_door(style, right == 1, kDoorWidthM, kDoorHeightM));
       }
     }
     window_picture_ = add(draw_window(2.2, 1.2, 3));
@@ -34,6 +33,8 @@ class Builder {
 
  private:
   using Slots = std::vector<std::pair<double, double>>;
+
+  const LegStyle& style_of(const Wall& wall) const { return scene_.legs[wall.leg]; }
 
   std::size_t add(Picture picture) {
     scene_.pictures.push_back(std::move(picture));
@@ -112,26 +113,35 @@ void Builder::fading(Wall& wall, Decal decal) {
 }
 
 void Builder::door(Wall& wall, Slots& taken, double u0, double u1) {
-  const double width = random_.chance(0.25) ? 1.7 : 0.95;
+  const LegStyle& leg = style_of(wall);
+  const bool two_leaves = random_.chance(0.25);
+  const double width = two_leaves ? leg.door_width_m + 0.75 : leg.door_width_m;
+  const double height = leg.door_height_m;
   double u = 0;
   if (!take(taken, u0, u1, width + 0.24, u)) return;
   u += 0.12;
   const int style = random_.integer(0, kDoorStyles - 1);
   const bool right = random_.chance(0.5);
-  const double frame_albedo = random_.chance(0.5) ? 225 : 85;
-  if (width > 1) {
-    wall.decals.push_back({u, u + width / 2, 0, kDoorHeightM, door_pictures_[style][1]});
-    wall.decals.push_back({u + width / 2, u + width, 0, kDoorHeightM, door_pictures_[style][0]});
+  const double frame_albedo = (random_.chance(0.5) ? 225 : 85) + leg.frame_tone;
+  const auto leaf = [&](double from, double to, bool handle_right) {
+    const std::size_t picture = door_pictures_[style][handle_right];
+    wall.decals.push_back({from, to, 0, height, picture, 1, false, leg.door_tone});
+  };
+  if (two_leaves) {
+    leaf(u, u + width / 2, true);
+    leaf(u + width / 2, u + width, false);
   } else {
-    wall.decals.push_back({u, u + width, 0, kDoorHeightM, door_pictures_[style][right]});
+    leaf(u, u + width, right);
   }
-  frame(wall, u, u + width, 0, kDoorHeightM, false, 0.07, 0.035, frame_albedo);
+  frame(wall, u, u + width, 0, height, false, leg.frame_bar_m, leg.frame_depth_m, frame_albedo);
   double plate = right ? u + width + 0.14 : u - 0.34;
-  fading(wall, {plate, plate + 0.2, 1.5, 1.64, add_picture(draw_plate(random_, room_++))});
+  const double up = leg.fitting_z_m;
+  fading(wall,
+         {plate, plate + 0.2, 1.5 + up, 1.64 + up, add_picture(draw_plate(random_, room_++))});
   const double gang = right ? u + width + 0.14 : u - 0.14 - 0.085;
-  wall.decals.push_back({gang, gang + 0.085, 1.05, 1.135, switch_pictures_[0]});
+  wall.decals.push_back({gang, gang + 0.085, 1.05 + up, 1.135 + up, switch_pictures_[0]});
   if (random_.chance(0.3)) {
-    fading(wall, {u + width / 2 - 0.25, u + width / 2 + 0.25, 2.2, 2.38,
+    fading(wall, {u + width / 2 - 0.25, u + width / 2 + 0.25, height + 0.12, height + 0.3,
                   add_picture(draw_sign(random_, 0.5, 0.18))});
   }
 }
@@ -152,15 +162,17 @@ void Builder::notice_board(Wall& wall, Slots& taken, double u0, double u1) {
   double u = 0;
   if (!take(taken, u0, u1, width + 0.1, u)) return;
   u += 0.05;
-  fading(wall, {u, u + width, 1.0, 1.9, add_picture(draw_notice_board(random_, width, 0.9))});
-  frame(wall, u, u + width, 1.0, 1.9, true, 0.03, 0.02, random_.chance(0.5) ? 70 : 215);
+  const double z = 1.0 + style_of(wall).fitting_z_m;
+  fading(wall, {u, u + width, z, z + 0.9, add_picture(draw_notice_board(random_, width, 0.9))});
+  frame(wall, u, u + width, z, z + 0.9, true, 0.03, 0.02, random_.chance(0.5) ? 70 : 215);
 }
 
 void Builder::window(Wall& wall, Slots& taken, double u0, double u1) {
   double u = 0;
   if (!take(taken, u0, u1, 2.4, u)) return;
-  wall.decals.push_back({u + 0.1, u + 2.3, 0.95, 2.15, window_picture_});
-  frame(wall, u + 0.1, u + 2.3, 0.95, 2.15, true, 0.05, 0.06, 225);
+  const double z = 0.95 + style_of(wall).fitting_z_m;
+  wall.decals.push_back({u + 0.1, u + 2.3, z, z + 1.2, window_picture_});
+  frame(wall, u + 0.1, u + 2.3, z, z + 1.2, true, 0.05, 0.06, 225);
   if (random_.chance(0.7)) box(wall, u + 0.3, u + 2.1, 0.15, 0.75, 0.1, 205);  // radiator
 }
 
@@ -220,18 +232,21 @@ void Builder::bay(Wall& wall, double u0, double u1, bool outer) {
 void Builder::furnish(Wall& wall, bool outer) {
   const double lo = wall.u_lo() + 0.5;
   const double hi = wall.u_hi() - 0.5;
-  const int bays = static_cast<int>((hi - lo - kPillarM) / kBayM);
+  const LegStyle& leg = style_of(wall);
+  const int bays = static_cast<int>((hi - lo - leg.pillar_m) / leg.bay_m);
   wall.rail = random_.chance(0.35);
-  wall.albedo = random_.uniform(172, 196);
+  wall.albedo = random_.uniform(172, 196) + leg.wall_tone;
   if (bays < 1) {
     if (hi - lo > 1) bay(wall, lo, hi, outer);
     return;
   }
-  const double start = (lo + hi - bays * kBayM) / 2;
+  const double half = leg.pillar_m / 2;
+  const double spare = hi - lo - leg.pillar_m - bays * leg.bay_m;
+  const double start = (lo + hi - bays * leg.bay_m) / 2 + leg.bay_shift * spare;
   for (int i = 0; i <= bays; ++i) {
-    const double u = start + i * kBayM;
-    box(wall, u - kPillarM / 2, u + kPillarM / 2, 0, scene_.height_m, kPillarDepthM, 200);
-    if (i < bays) bay(wall, u + kPillarM / 2 + 0.05, u + kBayM - kPillarM / 2 - 0.05, outer);
+    const double u = start + i * leg.bay_m;
+    box(wall, u - half, u + half, 0, scene_.height_m, leg.pillar_depth_m, 200 + leg.pillar_tone);
+    if (i < bays) bay(wall, u + half + 0.05, u + leg.bay_m - half - 0.05, outer);
   }
 }
 
@@ -250,6 +265,7 @@ Wall make_wall(const Scene& scene, std::size_t i, int side) {
   const Vec3 from = scene.corners[i] + half * (before + here);
   const Vec3 to = scene.corners[(i + 1) % n] + half * (here + after);
   Wall wall;
+  wall.leg = i;
   wall.axis = std::abs(here.x) > 0.5 ? 0 : 1;
   const bool x_plane = wall.axis == 0;
   wall.at = x_plane ? from.x : from.y;
@@ -265,11 +281,16 @@ void add_lights(Scene& scene, Random& random, bool lap_change) {
     const Vec3 leg = scene.corners[(i + 1) % n] - scene.corners[i];
     const double length = std::abs(leg.x) + std::abs(leg.y);
     const Vec3 ahead = (1 / length) * leg;
-    const int count = std::max(1, static_cast<int>(length / 2.7));
+    const LegStyle& style = scene.legs[i];
+    const Vec3 aside = style.lamp_aside_m * Vec3{-ahead.y, ahead.x, 0};
+    const double half_along = style.lamp_half_along_m;
+    const double half_across = style.lamp_half_across_m;
+    const int count = std::max(1, static_cast<int>(length / style.lamp_pitch_m));
     for (int k = 0; k < count; ++k) {
-      const Vec3 centre = scene.corners[i] + (length * (k + 0.5) / count) * ahead;
-      const double hx = std::abs(ahead.x) > 0.5 ? 0.6 : 0.15;
-      const double hy = std::abs(ahead.x) > 0.5 ? 0.15 : 0.6;
+      const Vec3 centre =
+          scene.corners[i] + (length * (k + 0.5) / count + style.lamp_shift_m) * ahead + aside;
+      const double hx = std::abs(ahead.x) > 0.5 ? half_along : half_across;
+      const double hy = std::abs(ahead.x) > 0.5 ? half_across : half_along;
       Light light{centre.x - hx, centre.x + hx, centre.y - hy, centre.y + hy, {1, 1}};
       light.level[0] = random.chance(0.1) ? 0 : random.uniform(0.85, 1);
       const bool toggled = random.chance(0.2);
@@ -345,6 +366,10 @@ Scene build_scene(const SceneOptions& options) {
   scene.seams = std::min(1.0, 2 * options.texture);
   Random random(mix64(options.seed));
   scene.corners = make_floor_plan(options.loop_m, scene.corner_radius_m, random);
+  for (std::size_t i = 0; i < scene.corners.size(); ++i) {
+    scene.legs.push_back(make_leg_style(options.seed, i, options.sameness));
+  }
+  scene.leg_map = LegMap(scene.corners, scene.width_m);
   Builder builder(scene, options);
   for (std::size_t i = 0; i < scene.corners.size(); ++i) {
     for (const int side : {1, -1}) {

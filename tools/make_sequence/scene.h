@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "make_sequence/geometry.h"
+#include "make_sequence/leg_style.h"
 #include "make_sequence/picture.h"
 
 namespace loopd::sequence {
@@ -18,6 +19,7 @@ struct Decal {
   std::size_t picture = 0;  ///< index into Scene::pictures
   double opacity = 1;
   bool multiply = false;  ///< darkens the wall (marks) instead of covering it
+  double tone = 0;        ///< added to the picture's grey
 };
 
 /// A full-height wall in the plane x = at (axis 0) or y = at (axis 1), facing +axis or -axis.
@@ -28,7 +30,8 @@ struct Wall {
   double hi = 0;
   int facing = 1;
   double albedo = 185;
-  bool rail = false;  ///< a protective strip at hand height
+  std::size_t leg = 0;  ///< index into Scene::legs
+  bool rail = false;    ///< a protective strip at hand height
   std::vector<Decal> decals;
   /// u of a point is u_sign() times its coordinate along the wall.
   double u_sign() const { return axis == 0 ? facing : -facing; }
@@ -80,6 +83,7 @@ struct SceneOptions {
                             ///< Below 0.5 tiles and ceiling panels fade too (crossings are points)
   bool lap_change = false;  ///< some lamps differ on odd laps
   std::uint64_t seed = 1;
+  double sameness = 0.3;  ///< 0..1: 1 makes every leg an exact copy in its dimensions
 };
 inline constexpr double kMinLoopM = 24;
 inline constexpr double kMaxLoopM = 2000;
@@ -92,6 +96,8 @@ struct Scene {
   double grain = 0;              ///< 0..1, strength of the fine wall texture
   double seams = 1;              ///< 0..1, contrast of floor tiles and ceiling panels
   std::vector<Vec3> corners;     ///< of the centre line, counter-clockwise
+  std::vector<LegStyle> legs;    ///< leg i runs from corner i to the next
+  LegMap leg_map;
   std::vector<Wall> walls;
   std::vector<Box> boxes;
   std::vector<Light> lights;

@@ -38,7 +38,7 @@ double fitted_loop_m(const SequenceOptions& o) {
 }
 
 SceneOptions scene_options(const SequenceOptions& o) {
-  return {fitted_loop_m(o), o.texture, o.lap_change, o.seed};
+  return {fitted_loop_m(o), o.texture, o.lap_change, o.seed, o.sameness};
 }
 
 Camera make_camera(const SequenceOptions& o) {
@@ -90,6 +90,7 @@ std::vector<std::string> validate(const SequenceOptions& o) {
   bad.range("laps", o.laps, 0.1, 1000);
   bad.range("step", o.step_m, 0.001, 5);
   bad.range("texture", o.texture, 0, 1);
+  bad.range("sameness", o.sameness, 0, 1);
   bad.range("noise", o.noise, 0, 50);
   bad.range("blur", o.blur_px, 0, 10);
   bad.range("exposure", o.exposure, 0, 0.9);

@@ -29,6 +29,7 @@ struct SequenceOptions {
   double loop_m = 0;    ///< length of a lap; 0 = fitted, so that `frames` steps make `laps` laps
   std::uint64_t seed = 1;
   double texture = 1;       ///< 0..1, point-like texture: posters, plates, marks, grain
+  double sameness = 0.3;    ///< 0..1, of the legs' dimensions and tones; 1 = exact copies
   double noise = 2;         ///< sensor noise, grey levels
   double blur_px = 0.6;     ///< standard deviation of the lens blur
   double exposure = 0.1;    ///< amplitude of a slow gain drift; its phase differs on later laps

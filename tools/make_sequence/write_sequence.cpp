@@ -102,6 +102,7 @@ std::string info_json(const Sequence& sequence) {
                                           {"loop", o.loop_m},
                                           {"seed", o.seed},
                                           {"texture", o.texture},
+                                          {"sameness", o.sameness},
                                           {"noise", o.noise},
                                           {"blur", o.blur_px},
                                           {"exposure", o.exposure},
