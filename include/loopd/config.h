@@ -18,6 +18,7 @@ struct FeaturesConfig {
   int fast_threshold = 7;
   double scale_factor = 1.2;
   int levels = 8;
+  double line_scale = 0.8;
   double min_line_length = 0.03;
   int min_features = 20;
 };

@@ -30,7 +30,8 @@ bool longer(const Line& a, const Line& b) {
 class LineExtractor::Impl {
  public:
   explicit Impl(const FeaturesConfig& config)
-      : config_(config), detector_(cv::createLineSegmentDetector(cv::LSD_REFINE_STD)) {}
+      : config_(config),
+        detector_(cv::createLineSegmentDetector(cv::LSD_REFINE_STD, config.line_scale)) {}
 
   void extract(const LumaView& image, std::vector<Line>& lines,
                std::vector<Descriptor>& descriptors) {
