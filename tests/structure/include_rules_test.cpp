@@ -5,9 +5,10 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <regex>
+#include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -33,17 +34,29 @@ struct Include {
   bool quoted = false;
 };
 
+// The include of one line, if it is one.
+std::optional<Include> parse_include(const std::string& line, const std::string& file) {
+  const std::size_t hash = line.find_first_not_of(" \t");
+  if (hash == std::string::npos || line[hash] != '#') return std::nullopt;
+  const std::size_t word = line.find_first_not_of(" \t", hash + 1);
+  if (word == std::string::npos || line.compare(word, 7, "include") != 0) return std::nullopt;
+  const std::size_t open = line.find_first_of("<\"", word);
+  if (open == std::string::npos) return std::nullopt;
+  const bool quoted = line[open] == '"';
+  const std::size_t close = line.find(quoted ? '"' : '>', open + 1);
+  if (close == std::string::npos) return std::nullopt;
+  return Include{file, line.substr(open + 1, close - open - 1), quoted};
+}
+
 std::vector<Include> includes_below(const fs::path& folder) {
-  static const std::regex line_form(R"(^\s*#\s*include\s*([<"])([^>"]+)[>"])");
   std::vector<Include> includes;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     if (entry.path().extension() != ".h" && entry.path().extension() != ".cpp") continue;
     std::ifstream file(entry.path());
     std::string line;
-    std::smatch match;
     while (std::getline(file, line))
-      if (std::regex_search(line, match, line_form))
-        includes.push_back({entry.path().string(), match[2], match[1] == "\""});
+      if (auto include = parse_include(line, entry.path().string()))
+        includes.push_back(std::move(*include));
   }
   return includes;
 }
