@@ -46,6 +46,3 @@ function(loopd_test name)
   include(GoogleTest)
   gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES TIMEOUT ${ARG_TIMEOUT})
 endfunction()
-
-# OpenCV's headers are not ours to warn about, and only these modules may be linked.
-add_library(loopd_opencv INTERFACE)
