@@ -56,6 +56,13 @@ bool CaptureLoop::handle(const CameraError& error) {
   return true;
 }
 
+bool CaptureLoop::handle(const CameraNotice& notice) {
+  const LogLevel level =
+      notice.kind == CameraNotice::Kind::kOpened ? LogLevel::kInfo : LogLevel::kWarning;
+  tell({level, {State::kRunning, monotonic_now_ns(), notice.message, ""}, false});
+  return true;
+}
+
 bool CaptureLoop::handle(EndOfStream) {
   counters_.away = true;
   counters_.ended = true;  // told by the detect thread once it has worked on the last frame

@@ -45,6 +45,7 @@ class CaptureLoop {
   bool handle(Frame frame);
   bool handle(const CameraError& error);
   bool handle(EndOfStream);
+  bool handle(const CameraNotice& notice);
   bool handle(Interrupted) { return false; }
   void camera_away(const CameraError& error);
   void frame_lost(const CameraError& error);

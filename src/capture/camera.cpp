@@ -8,6 +8,8 @@ std::string_view camera_fault_name(CameraFault fault) {
       return "no_device";
     case CameraFault::kPermission:
       return "permission";
+    case CameraFault::kBusy:
+      return "busy";
     case CameraFault::kUnsupported:
       return "unsupported";
     case CameraFault::kCorruptFrame:
@@ -16,6 +18,8 @@ std::string_view camera_fault_name(CameraFault fault) {
       return "too_large";
     case CameraFault::kStalled:
       return "stalled";
+    case CameraFault::kNoSignal:
+      return "no_signal";
     case CameraFault::kUnplugged:
       return "unplugged";
     case CameraFault::kStreamError:

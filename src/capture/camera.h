@@ -13,16 +13,19 @@ namespace loopd {
 enum class CameraFault : std::uint8_t {
   kNoDevice,      ///< the device is not there (yet, or not again)
   kPermission,    ///< it is there, but this process may not use it
+  kBusy,          ///< it is there, but another process streams from it
   kUnsupported,   ///< a format, or kind of file, that cannot be read
   kCorruptFrame,  ///< the data of one frame is damaged or incomplete
   kTooLarge,      ///< one frame has more pixels than the configured maximum
   kStalled,       ///< no frame came for max(1 s, 5 frame times)
+  kNoSignal,      ///< the device works, but nothing (or nothing it can lock on) is connected to it
   kUnplugged,     ///< the device went away while in use
   kStreamError,   ///< reading failed for another reason; the message and code say which
 };
 
-/// Stable lower-case name, as in logs and in events: "no_device", "permission", "unsupported",
-/// "corrupt_frame", "too_large", "stalled", "unplugged", "stream_error".
+/// Stable lower-case name, as in logs and in events: "no_device", "permission", "busy",
+/// "unsupported", "corrupt_frame", "too_large", "stalled", "no_signal", "unplugged",
+/// "stream_error".
 std::string_view camera_fault_name(CameraFault fault);
 
 /// A named failure of a camera, or of one frame of it.
@@ -36,13 +39,24 @@ struct CameraError {
   std::uint64_t sequence = 0;  ///< of the frame concerned, or of the next one if none is
 };
 
+/// Something worth telling that costs no frame.
+struct CameraNotice {
+  enum class Kind : std::uint8_t {
+    kOpened,       ///< the device was opened (again); which one, and with which format
+    kOtherCamera,  ///< it is not the camera that was there before
+    kTimeStamps,   ///< the driver's time stamps cannot be used; what replaces them
+  };
+  Kind kind = Kind::kOpened;
+  std::string message;  ///< one sentence
+};
+
 /// The source has no more frames; every later next() returns this too.
 struct EndOfStream {};
 
 /// interrupt() was called; every later next() returns this too.
 struct Interrupted {};
 
-using CameraEvent = std::variant<Frame, CameraError, EndOfStream, Interrupted>;
+using CameraEvent = std::variant<Frame, CameraError, CameraNotice, EndOfStream, Interrupted>;
 
 /// A source of luma frames whose buffers come from a FramePool, which must outlive the camera.
 ///
@@ -51,14 +65,14 @@ using CameraEvent = std::variant<Frame, CameraError, EndOfStream, Interrupted>;
 /// caller may loop over next() without sleeping of its own. The first frame after a loss means
 /// that the camera is back.
 ///
-/// Thread: next() and describe() by one thread at a time; interrupt() and dropped() by any thread
-/// (interrupt() is not for signal handlers). Destroy it when no call is running.
+/// Thread: next() and describe() by one thread at a time; interrupt(), dropped() and restamped() by
+/// any thread (interrupt() is not for signal handlers). Destroy it when no call is running.
 class Camera {
  public:
   virtual ~Camera() = default;
 
-  /// Blocks until there is a frame, an error, the end or an interrupt. Never throws for what the
-  /// source delivers.
+  /// Blocks until there is a frame, an error, a notice, the end or an interrupt. Never throws for
+  /// what the source delivers.
   virtual CameraEvent next() = 0;
 
   /// Ends the camera for good: a next() that is blocked, and every later one, returns Interrupted
@@ -71,6 +85,10 @@ class Camera {
   /// Frames that the source had, but that were never delivered: no buffer was free, next() was
   /// called too late, or the driver skipped them. Corrupt frames are errors and not counted here.
   virtual std::uint64_t dropped() const { return 0; }
+
+  /// Frames whose time stamp could not be believed (in the future, or standing still) and was
+  /// replaced by the time at which the frame came.
+  virtual std::uint64_t restamped() const { return 0; }
 };
 
 }  // namespace loopd

@@ -19,6 +19,7 @@ inline std::string event_text(const CameraEvent& event) {
   if (const auto* error = std::get_if<CameraError>(&event))
     return std::string(camera_fault_name(error->fault)) + " " + std::to_string(error->sequence) +
            (error->lost ? " lost" : "");
+  if (const auto* notice = std::get_if<CameraNotice>(&event)) return "notice: " + notice->message;
   return std::holds_alternative<EndOfStream>(event) ? "end" : "interrupted";
 }
 

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <memory>
+
+#include "base/frame_pool.h"
+#include "capture/camera.h"
+#include "capture/capture_device.h"
+
+namespace loopd {
+
+/// A real camera: opens it by `driver`, turns its frames into luma, notices what goes wrong, and
+/// gets it back.
+///
+/// No device at the start is fine: next() then answers as for a lost one. Loss: a `lost` error with
+/// its cause, then next() re-opens with a back-off (at most half a second, and at once when the
+/// driver's hotplug_fd() tells of a change); the first frame after it means that the camera is
+/// back. Time-out: no frame for max(1 s, 5 frame times) is kStalled (or what the device knows of
+/// the cause), and the device is closed and opened again.
+///
+/// Frames: the newest wins; those passed over, gaps in the driver's sequence, and frames for which
+/// no buffer was free are counted by dropped(). Damaged, short and undecodable ones are errors
+/// (kCorruptFrame) that cost that frame only. Frame::sequence is the driver's, made to grow without
+/// a step back over re-opening. Frame::time_ns is the driver's stamp where it can be believed (not
+/// in the future, not standing still or going back), else the time at which the frame came, with
+/// one notice a kind and opening; see restamped().
+///
+/// `pool` must outlive the camera. Errors: none; all that can go wrong is told by next().
+std::unique_ptr<Camera> make_live_camera(std::unique_ptr<CaptureDriver> driver, FramePool& pool);
+
+}  // namespace loopd
