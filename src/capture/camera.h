@@ -45,6 +45,7 @@ struct CameraNotice {
     kOpened,       ///< the device was opened (again); which one, and with which format
     kOtherCamera,  ///< it is not the camera that was there before
     kTimeStamps,   ///< the driver's time stamps cannot be used; what replaces them
+    kSettings,     ///< something that was asked for could not be had; the camera works without it
   };
   Kind kind = Kind::kOpened;
   std::string message;  ///< one sentence
@@ -86,8 +87,8 @@ class Camera {
   /// called too late, or the driver skipped them. Corrupt frames are errors and not counted here.
   virtual std::uint64_t dropped() const { return 0; }
 
-  /// Frames whose time stamp could not be believed (in the future, or standing still) and was
-  /// replaced by the time at which the frame came.
+  /// Frames whose time stamp could not be believed (none, in the future, standing still, going
+  /// back, or older than the stream) and was replaced by the time at which the frame came.
   virtual std::uint64_t restamped() const { return 0; }
 };
 

@@ -6,7 +6,9 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <variant>
+#include <vector>
 
 #include "capture/camera.h"
 #include "capture/interrupt.h"
@@ -30,6 +32,7 @@ enum class PixelFormat : std::uint8_t {
 
 /// "GREY", "Y10 ", "Y16 ", "NV12", "YU12", "YUYV", "UYVY", "RGB3", "BGR3", "MJPG": V4L2's codes.
 std::string_view pixel_format_name(PixelFormat format);
+/// The padding of "Y10 " may be left out. None for any other name.
 std::optional<PixelFormat> pixel_format_from_name(std::string_view name);
 
 /// One frame as the driver gave it. The memory is the driver's until CaptureDevice::release().
@@ -65,6 +68,9 @@ struct DeviceInfo {
   double fps = 0;     ///< as negotiated; 0 = not known
   std::string clock;  ///< of the driver's stamps: "monotonic", "boottime", "unknown"
   StampInstant instant = StampInstant::kUnknown;
+  /// What was asked for and could not be had, such as a control the camera refuses: one sentence
+  /// each. None of it costs the camera.
+  std::vector<std::string> warnings{};
 };
 
 /// grab() found no frame before its deadline.
@@ -86,6 +92,7 @@ class CaptureDevice {
   /// Gives the frame of the last grab() back to the driver. No-op if none is out.
   virtual void release() = 0;
 
+  /// What was opened; clock and instant may become known with the first frame only.
   virtual const DeviceInfo& info() const = 0;
 };
 

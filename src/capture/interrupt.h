@@ -18,6 +18,9 @@ class Interrupt {
   bool requested() const { return stop_.stop_requested(); }
   std::stop_token token() const { return stop_.get_token(); }
 
+  /// Readable once requested, for a poll of one's own. Never read from it.
+  int fd() const { return event_.get(); }
+
   /// Waits until CLOCK_MONOTONIC reaches `deadline_ns`; false if interrupted before.
   bool wait_until(std::int64_t deadline_ns) const;
 
