@@ -1,0 +1,1 @@
+"""What cases of tests/vm share. Python's standard library only; runs inside the machine."""
