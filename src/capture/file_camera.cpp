@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdio>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "base/clock.h"
@@ -17,6 +18,8 @@
 #include "capture/fault_script.h"
 #include "capture/folder_source.h"
 #include "capture/interrupt.h"
+#include "capture/recording_format.h"
+#include "capture/recording_source.h"
 #include "capture/video_source.h"
 
 namespace loopd {
@@ -173,7 +176,8 @@ class FileCamera : public Camera {
     return {fault,
             "the camera of " + options_.path + " " + what + ", as scripted at frame " +
                 std::to_string(break_->fault.frame),
-            fault == CameraFault::kStalled ? ETIMEDOUT : ENODEV, true, sequence_};
+            fault == CameraFault::kStalled ? ETIMEDOUT : ENODEV, true,
+            source_->camera_sequence(sequence_)};
   }
 
   void skip_to(std::uint64_t frame) {
@@ -228,7 +232,8 @@ class FileCamera : public Camera {
     frame.height_px = size.height_px;
     frame.stride_bytes = size.width_px;
     frame.time_ns = time_of(sequence_, now_ns);
-    frame.sequence = sequence_++;
+    frame.sequence = source_->camera_sequence(sequence_);
+    ++sequence_;
     return frame;
   }
 
@@ -254,7 +259,7 @@ class FileCamera : public Camera {
   FramePool* const pool_;
   CaptureClock clock_;
   Schedule schedule_;
-  std::uint64_t sequence_;  ///< of the next frame
+  std::uint64_t sequence_;  ///< number of the next frame, counted over all laps
   std::optional<Break> break_;
   std::int64_t away_ns_ = 0;      ///< simulated time spent in stalls and unpluggings
   std::uint64_t bad_frames_ = 0;  ///< lost in a row
@@ -275,14 +280,32 @@ Status check(const FileCameraOptions& options) {
                EINVAL};
 }
 
-// One image file is a folder of one; any other file is left to the video decoder.
-bool is_image_file(const std::string& path) {
+enum class FileKind : std::uint8_t { kImage, kRecording, kOther };
+
+FileKind file_kind(const std::string& path) {
   std::FILE* file = std::fopen(path.c_str(), "rbe");
-  if (file == nullptr) return false;
-  std::array<std::uint8_t, 16> start{};
-  const std::size_t length = std::fread(start.data(), 1, start.size(), file);
+  if (file == nullptr) return FileKind::kOther;
+  std::array<std::uint8_t, 16> bytes{};
+  const std::size_t length = std::fread(bytes.data(), 1, bytes.size(), file);
   std::fclose(file);
-  return image_format({start.data(), length}).has_value();
+  const std::span<const std::uint8_t> start(bytes.data(), length);
+  if (is_recording(start)) return FileKind::kRecording;
+  return image_format(start) ? FileKind::kImage : FileKind::kOther;
+}
+
+// One image is a folder of one; what is neither image nor recording is left to the video decoder.
+Result<std::unique_ptr<FrameSource>> open_file(const SourceOptions& source,
+                                               const std::string& video_decoder,
+                                               const Interrupt& interrupt) {
+  switch (file_kind(source.path)) {
+    case FileKind::kImage:
+      return open_folder_source(source);
+    case FileKind::kRecording:
+      return open_recording_source(source, interrupt);
+    case FileKind::kOther:
+      break;
+  }
+  return open_video_source(source, video_decoder, interrupt);
 }
 
 // No other device may be opened to see what it is: that alone can have consequences.
@@ -314,8 +337,7 @@ Result<std::unique_ptr<FrameSource>> open_source(const FileCameraOptions& option
   if (S_ISDIR(status.st_mode)) return open_folder_source(source);
   if (!S_ISREG(status.st_mode))
     return Error{"cannot open " + options.path + ": it is neither a folder nor a file", ENOTSUP};
-  if (is_image_file(options.path)) return open_folder_source(source);
-  return open_video_source(source, options.video_decoder, interrupt);
+  return open_file(source, options.video_decoder, interrupt);
 }
 
 }  // namespace

@@ -9,10 +9,10 @@
 
 namespace loopd {
 
-/// How a folder of images or a video file stands in for a camera.
+/// How a folder of images, a recording or a video file stands in for a camera.
 struct FileCameraOptions {
-  /// A folder of images; a dataset folder (then its `images/` is used); one image; or a video; or
-  /// a V4L2 device, see below.
+  /// A folder of images; a dataset folder (then its `images/` is used); one image; a raw recording
+  /// (recording_format.h); or a video; or a V4L2 device, see below.
   /// In a folder every *.jpg, *.jpeg, *.png, *.pgm, *.ppm and *.pnm (any case) is a frame, sorted
   /// by name byte by byte; other names are ignored. What is in a file is decided by its content.
   std::string path = {};
@@ -42,12 +42,14 @@ struct FileCameraOptions {
   std::string video_decoder = {};
 };
 
-/// Opens a folder of images, one image, or a video file as a camera.
+/// Opens a folder of images, one image, a raw recording, or a video file as a camera.
 ///
 /// Frames: Frame::sequence is the 0-based index in the folder or video and goes on growing when
 /// looping. Frame::time_ns is, in real time, CLOCK_MONOTONIC at the frame's turn, before it is
 /// decoded; in lock-step, from `times.txt` (in the given folder or beside the images), else from
-/// a rate as above, else none. stride_bytes = width_px. Sizes may differ from frame to frame.
+/// a rate as above, else none. A recording has both as the camera gave them (in real time the
+/// sequence number only); fault scripts count its frames from 0 all the same. stride_bytes =
+/// width_px. Sizes may differ from frame to frame.
 ///
 /// `times.txt`: one number a line for each image, in the same order; blank lines and lines that
 /// start with # are skipped. Whole numbers whose median step is at least 100000 are nanoseconds;

@@ -31,6 +31,10 @@ class FrameSource {
   /// The recorded time of a frame, without laps: none if none is known.
   virtual std::optional<std::int64_t> time_ns(std::uint64_t sequence) const = 0;
 
+  /// The sequence number that frame `sequence` gets: its own, or for a recording of a camera the
+  /// one the camera gave. Known for sure for the prepared frame only.
+  virtual std::uint64_t camera_sequence(std::uint64_t sequence) const { return sequence; }
+
   /// Frames of one lap; 0 if not known.
   virtual std::uint64_t length() const = 0;
 
