@@ -1,0 +1,135 @@
+#include "capture/libcamera_driver.h"
+
+#include <fcntl.h>
+#include <libcamera/camera_manager.h>
+#include <libcamera/stream.h>
+
+#include <cerrno>
+#include <string>
+
+#include "base/unique_fd.h"
+#include "capture/libcamera_dev_watch.h"
+#include "capture/libcamera_device.h"
+#include "capture/libcamera_manager.h"
+#include "capture/libcamera_selection.h"
+
+namespace loopd {
+namespace {
+
+CameraError not_started(const Error& error) {
+  CameraError result;
+  result.fault = error.code == EBUSY ? CameraFault::kBusy : CameraFault::kStreamError;
+  result.message = error.message;
+  result.code = error.code;
+  result.lost = true;
+  return result;
+}
+
+// libcamera passes over in silence what it may not open. A media device that this process may not
+// open is a better reason than "no camera".
+std::optional<CameraError> forbidden_media_device() {
+  for (int i = 0; i < 64; ++i) {
+    const std::string path = "/dev/media" + std::to_string(i);
+    const UniqueFd fd(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
+    if (fd.valid() || (errno != EACCES && errno != EPERM)) continue;
+    CameraError error;
+    error.fault = CameraFault::kPermission;
+    error.code = errno;
+    error.message = "libcamera sees no camera that fits, and may not open " + path +
+                    "; let this user read and write it (group video, DeviceAllow= of the service)";
+    error.lost = true;
+    return error;
+  }
+  return std::nullopt;
+}
+
+std::vector<CameraName> names_of(const std::vector<std::shared_ptr<libcamera::Camera>>& cameras) {
+  std::vector<CameraName> names;
+  for (const auto& camera : cameras) names.push_back(camera_name(*camera));
+  return names;
+}
+
+class LibcameraDriver final : public CaptureDriver {
+ public:
+  explicit LibcameraDriver(const LibcameraOptions& options)
+      : options_(options), selection_(options.camera) {}
+
+  Opened open() override {
+    DevWatch watch;  // before the cameras are looked at: nothing that goes from then on is missed
+    auto started = LibcameraManager::start();
+    if (!started) return not_started(started.error());
+    // Declared before the cameras, so that it outlives them whatever fails.
+    const std::shared_ptr<LibcameraManager> manager = std::move(started).value();
+    const auto cameras = manager->cameras();
+    const std::vector<CameraName> names = names_of(cameras);
+    const CameraSelection::Choice choice = selection_.choose(names);
+    if (const auto* error = std::get_if<CameraError>(&choice))
+      return forbidden_media_device().value_or(*error);
+    const std::size_t index = std::get<std::size_t>(choice);
+    Opened opened = LibcameraDevice::open(manager, cameras[index], std::move(watch), options_);
+    if (std::holds_alternative<std::unique_ptr<CaptureDevice>>(opened))
+      selection_.keep(names, index);
+    return opened;
+  }
+
+  int hotplug_fd() const override { return watch_.fd(); }
+  void acknowledge() override { watch_.acknowledge(); }
+
+  std::string describe() const override {
+    return options_.camera.empty() ? "first libcamera camera"
+                                   : "libcamera camera " + options_.camera;
+  }
+
+ private:
+  LibcameraOptions options_;
+  CameraSelection selection_;
+  DevWatch watch_;
+};
+
+std::string sizes_text(const std::vector<FrameSize>& sizes) {
+  std::string text;
+  for (const FrameSize& size : sizes)
+    text += " " + std::to_string(size.width_px) + "x" + std::to_string(size.height_px);
+  return text;
+}
+
+LibcameraListing listing_of(const LibcameraManager& manager, libcamera::Camera& camera) {
+  const CameraName name = camera_name(camera);
+  LibcameraListing listing{name.id, name.model, {}, {}, {}, {}};
+  for (const CameraNode& node : manager.nodes(camera)) listing.nodes.push_back("/dev/" + node.name);
+  const auto config = camera.generateConfiguration({libcamera::StreamRole::Viewfinder});
+  if (!config || config->empty()) {
+    listing.problem = "libcamera offers no stream of it for viewing";
+    return listing;
+  }
+  for (const FormatOffer& offer : format_offers(config->at(0).formats())) {
+    const auto format = pixel_format_from_drm(offer.code, offer.modifier);
+    if (format)
+      listing.formats.push_back(std::string(pixel_format_name(*format)) + sizes_text(offer.sizes));
+    else
+      listing.other_formats.push_back(
+          libcamera::PixelFormat(offer.code, offer.modifier).toString());
+  }
+  return listing;
+}
+
+}  // namespace
+
+LibcameraBuild libcamera_build() {
+  return {true, "libcamera " + libcamera::CameraManager::version()};
+}
+
+std::unique_ptr<CaptureDriver> make_libcamera_driver(const LibcameraOptions& options) {
+  return std::make_unique<LibcameraDriver>(options);
+}
+
+Result<std::vector<LibcameraListing>> list_libcamera_cameras() {
+  auto manager = LibcameraManager::start();
+  if (!manager) return manager.error();
+  std::vector<LibcameraListing> listings;
+  for (const auto& camera : manager.value()->cameras())
+    listings.push_back(listing_of(*manager.value(), *camera));
+  return listings;
+}
+
+}  // namespace loopd
