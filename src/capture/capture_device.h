@@ -65,8 +65,10 @@ struct DeviceInfo {
   PixelFormat format = PixelFormat::kGrey;
   int width_px = 0;
   int height_px = 0;
-  double fps = 0;     ///< as negotiated; 0 = not known
-  std::string clock;  ///< of the driver's stamps: "monotonic", "boottime", "unknown"
+  double fps = 0;  ///< as negotiated; 0 = not known
+  /// Of the driver's stamps: "monotonic", "boottime", "copied" (made by whatever feeds a loopback
+  /// device, of no certain clock), "unknown".
+  std::string clock;
   StampInstant instant = StampInstant::kUnknown;
   /// What was asked for and could not be had, such as a control the camera refuses: one sentence
   /// each. None of it costs the camera.
