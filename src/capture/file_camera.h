@@ -26,7 +26,8 @@ struct FileCameraOptions {
   /// Start over at the end, without end. Sequence numbers and times go on growing.
   bool loop = false;
 
-  /// 0-based index of the first frame to deliver; it must exist. The second lap starts at 0.
+  /// 0-based index of the first frame to deliver; it must exist (a video or recording that is
+  /// shorter just ends). The second lap starts at 0.
   int start = 0;
 
   /// Only for fps = 0 and where no other time is known: the rate from which times are made

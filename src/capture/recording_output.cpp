@@ -65,6 +65,7 @@ class FileOutput : public RecordingOutput {
 
   // Asks the file system once for each stretch sent to it, and counts in between.
   Status check_free(std::size_t bytes) {
+    if (keep_free_bytes_ == 0) return Nothing{};
     if (!free_known_) {
       struct statvfs status {};
       if (::fstatvfs(file_.get(), &status) != 0) return write_error(errno);

@@ -29,7 +29,7 @@ class RecordingOutput {
 /// before is waited for and then forgotten by the page cache: so a recording never holds more
 /// than about 16 MiB and 2 s of the machine's memory (and of what a power cut costs, beside the
 /// file system's own interval, 5 s on ext4). append() fails like a full disk before the file
-/// system has less than `keep_free_bytes` left for others.
+/// system has less than `keep_free_bytes` left for others; with 0 it is filled to the last byte.
 /// Errors: `file` is not regular, not empty, not writable, or appends by itself.
 Result<std::unique_ptr<RecordingOutput>> open_recording_output(UniqueFd file,
                                                                std::uint64_t keep_free_bytes);

@@ -82,9 +82,7 @@ Result<std::unique_ptr<RecordingWriter>> RecordingWriter::start(
   }
   Result<NamedThread> thread = NamedThread::start(
       options.thread, [self = writer.get()] { self->run(); },
-      [self = writer.get()](const std::string&, std::exception_ptr) {
-        self->finish(RecordingEnd::kWriteError);
-      });
+      [self = writer.get()](const std::string&, std::exception_ptr) { self->give_up(); });
   if (!thread.ok()) return thread.error();
   writer->thread_ = std::move(thread).value();
   return writer;
@@ -176,6 +174,16 @@ RecordingEnd RecordingWriter::fail(const Error& error) {
   }
   const bool full = result_.code == ENOSPC || result_.code == EDQUOT;
   return full ? RecordingEnd::kDiskFull : RecordingEnd::kWriteError;
+}
+
+// After an exception, which can only be that there was no memory for a message.
+void RecordingWriter::give_up() {
+  buffer_.close();
+  {
+    const std::lock_guard lock(mutex_);
+    result_.code = ENOMEM;
+  }
+  finish(RecordingEnd::kWriteError);
 }
 
 void RecordingWriter::finish(RecordingEnd end) {

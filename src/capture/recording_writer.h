@@ -115,6 +115,7 @@ class RecordingWriter {
   std::optional<RecordingEnd> write(const RecordingBuffer::Item& item);
   std::optional<RecordingEnd> append(std::span<const std::uint8_t> bytes, std::uint64_t frames);
   RecordingEnd fail(const Error& error);
+  void give_up();
   void finish(RecordingEnd end);
 
   const RecordingOptions options_;
