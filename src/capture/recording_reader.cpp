@@ -107,7 +107,8 @@ Result<std::optional<RecordingReader::Found>> RecordingReader::find() {
 std::optional<RecordedFrame> RecordingReader::acceptable(std::span<const std::uint8_t> header,
                                                          std::uint64_t at) const {
   const auto frame = decode_recorded_frame(header.first<kRecordingFrameHeaderBytes>());
-  if (!frame || frame->number < next_number_) return std::nullopt;
+  if (!frame) return std::nullopt;
+  // Unsigned: an older number gives a difference larger than any file.
   if (frame->number - next_number_ > (at - position_) / kRecordingSmallestRecordBytes)
     return std::nullopt;
   return frame;

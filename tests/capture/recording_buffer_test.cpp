@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <deque>
 #include <random>
 #include <vector>
@@ -27,9 +28,11 @@ Shot shot_of(const RecordingBuffer::Item& item) {
           item.frame.time_ns, std::vector<std::uint8_t>(pixels.begin(), pixels.end())};
 }
 
+// As the writer does, with a header put before the pixels.
 Shot take(RecordingBuffer& buffer) {
   const auto item = buffer.front(std::nullopt);
   if (!item) return {};
+  std::ranges::fill(item->record.first(64), std::uint8_t{0xEE});
   const Shot shot = shot_of(*item);
   buffer.pop();
   return shot;

@@ -173,10 +173,19 @@ TEST_F(RecordingReaderTest, NumbersThatDoNotFitTheFileAreNotBelieved) {
                   shot.luma);
     EXPECT_TRUE(read_all(recording.bytes).empty()) << number;
   }
+  for (const std::uint64_t number : {std::uint64_t{1}, std::uint64_t{2}}) {
+    RecordingBytes recording;
+    recording.add(shot);
+    recording.bytes[recording.starts[0]] = 'x';  // room for one frame before the next header
+    recording.add({.number = number, .size = {4, 4}, .pixels_crc = recording_crc(shot.luma)},
+                  shot.luma);
+    EXPECT_EQ(read_all(recording.bytes).size(), number == 1 ? 1u : 0u) << number;
+  }
+  const Shot other = make_shot(4, 4, 2, 2);
   RecordingBytes repeated;
   repeated.add(shot);
-  repeated.add({.number = 0, .size = {4, 4}}, shot.luma);
-  EXPECT_EQ(read_all(repeated.bytes).size(), 1u);
+  repeated.add({.number = 0, .size = {4, 4}, .pixels_crc = recording_crc(other.luma)}, other.luma);
+  EXPECT_EQ(read_all(repeated.bytes), (std::map<std::uint64_t, Shot>{{0, shot}}));
 }
 
 TEST_F(RecordingReaderTest, AFrameThatClaimsGigabytesIsTheEnd) {
