@@ -94,8 +94,10 @@ LibcameraDevice::LibcameraDevice(std::shared_ptr<LibcameraManager> manager,
       camera_(std::move(camera)),
       watch_(std::move(watch)),
       nodes_(manager_->nodes(*camera_)) {
-  for (const CameraNode& node : nodes_) node_names_.push_back(node.name);
   info_.id = stable_id(*camera_, nodes_);
+  // Better to look again at a camera that stayed than to miss that this one went.
+  if (nodes_.empty()) nodes_ = video_nodes();
+  for (const CameraNode& node : nodes_) node_names_.push_back(node.name);
   info_.name = camera_name(*camera_).model;
   if (info_.name.empty()) info_.name = camera_->id();
   info_.node = camera_->id();
@@ -108,13 +110,17 @@ LibcameraDevice::LibcameraDevice(std::shared_ptr<LibcameraManager> manager,
 // camera is released, and no camera when the manager stops.
 LibcameraDevice::~LibcameraDevice() {
   if (held_) planes_[*held_].end_read();
-  if (started_) camera_->stop();  // also of a camera that has gone: it takes the requests back
+  // A camera that has gone must not be stopped: the kernel refuses that, libcamera (0.0.3 at least)
+  // then finds its requests still queued, and ends the process. Nothing writes into their buffers
+  // any more, so they may go as they are; the manager, which stops next, closes the device.
+  const bool gone = has_gone();
+  if (started_ && !gone) camera_->stop();
   camera_->requestCompleted.disconnect(this);
   camera_->disconnected.disconnect(this);
   requests_.clear();
   planes_.clear();
   allocator_.reset();
-  if (acquired_) camera_->release();
+  if (acquired_ && !gone) camera_->release();
   config_.reset();
   camera_.reset();
 }
@@ -351,6 +357,13 @@ void LibcameraDevice::requeue(std::size_t index) {
 void LibcameraDevice::withdraw(int status) {
   if (queued_ == 0 && !lost_)
     lost_ = nodes_present() ? failed("it takes no more requests", status) : unplugged();
+}
+
+// Looked at anew, as it may have gone since the last grab(); and remembered, as another may have
+// come in its place since.
+bool LibcameraDevice::has_gone() const {
+  const bool told = lost_ && lost_->fault == CameraFault::kUnplugged;
+  return told || board_.disconnected() || !nodes_present();
 }
 
 bool LibcameraDevice::nodes_present() const {

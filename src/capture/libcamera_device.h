@@ -72,6 +72,7 @@ class LibcameraDevice final : public CaptureDevice {
   bool intact(std::size_t index) const;
   void requeue(std::size_t index);
   void withdraw(int status);
+  bool has_gone() const;
   bool nodes_present() const;
   CameraError failed(const std::string& what, int status) const;
   CameraError unplugged() const;

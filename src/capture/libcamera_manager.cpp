@@ -48,25 +48,6 @@ void quieten_libcamera() {
     libcamera::logSetTarget(libcamera::LoggingTargetNone);
 }
 
-// The nodes of /dev whose names begin with "video".
-std::vector<CameraNode> video_nodes() {
-  std::vector<CameraNode> nodes;
-  DIR* const folder = ::opendir("/dev");
-  if (folder == nullptr) return nodes;
-  while (const dirent* const entry = ::readdir(folder)) {
-    const std::string name = entry->d_name;
-    struct stat status {};
-    if (name.rfind("video", 0) != 0) continue;
-    if (::stat(("/dev/" + name).c_str(), &status) == 0 && S_ISCHR(status.st_mode))
-      nodes.push_back({name, status.st_rdev});
-  }
-  ::closedir(folder);
-  std::sort(nodes.begin(), nodes.end(), [](const CameraNode& a, const CameraNode& b) {
-    return minor(a.number) < minor(b.number);
-  });
-  return nodes;
-}
-
 // Up to 0.1 the manager finds a camera by the number of its node; later ones tell the numbers.
 template <class Manager>
 bool belongs(Manager& manager, const libcamera::Camera& camera, dev_t number) {
@@ -121,6 +102,24 @@ std::vector<CameraNode> LibcameraManager::nodes(const libcamera::Camera& camera)
   std::vector<CameraNode> nodes = video_nodes();
   std::erase_if(nodes,
                 [&](const CameraNode& node) { return !belongs(*manager_, camera, node.number); });
+  return nodes;
+}
+
+std::vector<CameraNode> video_nodes() {
+  std::vector<CameraNode> nodes;
+  DIR* const folder = ::opendir("/dev");
+  if (folder == nullptr) return nodes;
+  while (const dirent* const entry = ::readdir(folder)) {
+    const std::string name = entry->d_name;
+    struct stat status {};
+    if (name.rfind("video", 0) != 0) continue;
+    if (::stat(("/dev/" + name).c_str(), &status) == 0 && S_ISCHR(status.st_mode))
+      nodes.push_back({name, status.st_rdev});
+  }
+  ::closedir(folder);
+  std::sort(nodes.begin(), nodes.end(), [](const CameraNode& a, const CameraNode& b) {
+    return minor(a.number) < minor(b.number);
+  });
   return nodes;
 }
 

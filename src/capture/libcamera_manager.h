@@ -46,6 +46,9 @@ class LibcameraManager {
   std::unique_ptr<libcamera::CameraManager> manager_;
 };
 
+/// Every node of /dev whose name begins with "video", in the order of their numbers.
+std::vector<CameraNode> video_nodes();
+
 /// Id and model of a camera.
 CameraName camera_name(const libcamera::Camera& camera);
 
