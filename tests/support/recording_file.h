@@ -29,8 +29,8 @@ struct Shot {
 inline Shot make_shot(int width, int height, std::uint64_t sequence,
                       std::optional<std::int64_t> time_ns) {
   Shot shot{width, height, sequence, time_ns, {}};
-  for (int i = 0; i < width * height; ++i)
-    shot.luma.push_back(static_cast<std::uint8_t>((i * 7 + static_cast<int>(sequence) * 31) % 251));
+  for (std::uint64_t i = 0; i < static_cast<std::uint64_t>(width * height); ++i)
+    shot.luma.push_back(static_cast<std::uint8_t>((i * 7 + sequence % 251 * 31) % 251));
   return shot;
 }
 
