@@ -4,10 +4,11 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "base/result.h"
-#include "base/unique_fd.h"
-#include "events/line_buffer.h"
+#include "events/client_connection.h"
 #include "events/records.h"
 
 namespace loopd {
@@ -26,25 +27,21 @@ class EventClient {
   /// reason if the daemon has closed the connection already ("too many clients").
   Status watch(const WatchRequest& request);
   /// Sends `bytes` as they are. Blocks while the daemon does not read, at most a second.
-  Status send(std::string_view bytes);
+  Status send(std::string_view bytes) { return connection_.send(bytes); }
 
   /// The next record, without its newline; none if `timeout` passed before it was complete, or as
   /// soon as `wake_fd` (if any) can be read. Errors: the connection has ended; a record longer
   /// than allowed.
-  Result<std::optional<std::string>> next(std::chrono::milliseconds timeout, int wake_fd = -1);
+  Result<std::optional<std::string>> next(std::chrono::milliseconds timeout, int wake_fd = -1) {
+    return connection_.next(timeout, wake_fd);
+  }
 
-  int fd() const { return fd_.get(); }
+  int fd() const { return connection_.fd(); }
 
  private:
-  enum class Wait { kReadable, kNothing };
-  EventClient(UniqueFd fd, std::string path, std::size_t max_record_bytes)
-      : fd_(std::move(fd)), path_(std::move(path)), lines_(max_record_bytes) {}
-  Result<Wait> wait_until(std::chrono::steady_clock::time_point deadline, int wake_fd) const;
-  Status receive();
+  explicit EventClient(ClientConnection connection) : connection_(std::move(connection)) {}
 
-  UniqueFd fd_;
-  std::string path_;
-  LineBuffer lines_;
+  ClientConnection connection_;
 };
 
 }  // namespace loopd

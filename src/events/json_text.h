@@ -26,4 +26,17 @@ void set_known(Json& json, std::string_view key, const std::optional<T>& value) 
   if (value) json[std::string(key)] = *value;
 }
 
+/// What a client sent, or why it cannot be understood.
+struct ReadRequest {
+  std::optional<Json> json;  ///< an object with a text member "op"
+  std::string op;
+  std::string error;  ///< one sentence, if not
+};
+
+/// Reads one request of any bytes. `example_op` is named in the errors. Reentrant.
+ReadRequest read_request(std::string_view text, std::string_view example_op);
+
+/// `text` in quotes, cut after 40 bytes: for answers that name a client's own words.
+std::string quote(const std::string& text);
+
 }  // namespace loopd::json_text

@@ -24,13 +24,25 @@ Error missing_folder(const std::string& path) {
           ENOENT};
 }
 
+Error in_use(const std::string& path) {
+  return {what(path) + ": a running daemon uses it; stop that one or choose another path",
+          EADDRINUSE};
+}
+
+Result<PathLock> lock_path(const std::string& path) {
+  Result<PathLock> lock = PathLock::take(path);
+  if (lock) return lock;
+  if (lock.error().code == EADDRINUSE) return in_use(path);
+  if (lock.error().code == ENOENT) return missing_folder(path);
+  return Error{what(path) + ": " + lock.error().message, lock.error().code};
+}
+
 /// Whether the socket file at `path` has no one behind it. A live one is an error.
-Result<bool> is_stale(const std::string& path, const sockaddr_un& address) {
-  UniqueFd probe(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+Result<bool> is_stale(const std::string& path, const sockaddr_un& address, int type) {
+  UniqueFd probe(socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!probe.valid()) return errno_error(what(path) + ": no socket to be had", errno);
   if (connect(probe.get(), generic(address), sizeof(address)) == 0 || errno == EAGAIN) {
-    return Error{what(path) + ": a running daemon uses it; stop that one or choose another path",
-                 EADDRINUSE};
+    return in_use(path);
   }
   if (errno == ECONNREFUSED) return true;
   if (errno == ENOENT) return false;  // its owner has just removed it
@@ -41,7 +53,7 @@ Result<bool> is_stale(const std::string& path, const sockaddr_un& address) {
 }
 
 /// Makes room at `path` for a socket file of ours.
-Status clear_path(const std::string& path, const sockaddr_un& address) {
+Status clear_path(const std::string& path, const sockaddr_un& address, int type) {
   struct stat file;
   if (lstat(path.c_str(), &file) != 0) {
     if (errno == ENOENT) return Nothing();  // bind() tells if it is the folder that is missing
@@ -50,7 +62,7 @@ Status clear_path(const std::string& path, const sockaddr_un& address) {
   if (!S_ISSOCK(file.st_mode)) {
     return Error{what(path) + ": something that is not a socket is there; move it away", EEXIST};
   }
-  const Result<bool> stale = is_stale(path, address);
+  const Result<bool> stale = is_stale(path, address, type);
   if (!stale) return stale.error();
   if (stale.value() && unlink(path.c_str()) != 0 && errno != ENOENT) {
     return errno_error(what(path) + ": cannot remove the stale socket file there", errno);
@@ -75,11 +87,17 @@ Result<sockaddr_un> unix_address(const std::string& path) {
   return address;
 }
 
-Result<ListeningSocket> ListeningSocket::bind(const std::string& path, mode_t mode) {
+std::string seqpacket_path(const std::string& stream_path) {
+  return std::filesystem::path(stream_path).replace_extension(".seqpacket").string();
+}
+
+Result<ListeningSocket> ListeningSocket::bind(const std::string& path, mode_t mode, int type) {
   const Result<sockaddr_un> address = unix_address(path);
   if (!address) return address.error();
-  if (Status clear = clear_path(path, address.value()); !clear) return clear.error();
-  UniqueFd fd(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  Result<PathLock> lock = lock_path(path);
+  if (!lock) return lock.error();
+  if (Status clear = clear_path(path, address.value(), type); !clear) return clear.error();
+  UniqueFd fd(socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!fd.valid()) return errno_error(what(path) + ": no socket to be had", errno);
   if (::bind(fd.get(), generic(address.value()), sizeof(sockaddr_un)) != 0) {
     if (errno == ENOENT) return missing_folder(path);
@@ -87,17 +105,23 @@ Result<ListeningSocket> ListeningSocket::bind(const std::string& path, mode_t mo
   }
   struct stat file;
   if (lstat(path.c_str(), &file) != 0) return errno_error(what(path), errno);
-  ListeningSocket socket(std::move(fd), path, file);
+  ListeningSocket socket(std::move(lock).value(), std::move(fd), path, file);
   if (chmod(path.c_str(), mode) != 0) return errno_error(what(path) + ": cannot chmod it", errno);
   if (::listen(socket.fd(), SOMAXCONN) != 0) return errno_error(what(path), errno);
   return socket;
 }
 
-ListeningSocket::ListeningSocket(UniqueFd fd, std::string path, const struct stat& file)
-    : fd_(std::move(fd)), path_(std::move(path)), device_(file.st_dev), inode_(file.st_ino) {}
+ListeningSocket::ListeningSocket(PathLock lock, UniqueFd fd, std::string path,
+                                 const struct stat& file)
+    : lock_(std::move(lock)),
+      fd_(std::move(fd)),
+      path_(std::move(path)),
+      device_(file.st_dev),
+      inode_(file.st_ino) {}
 
 ListeningSocket::ListeningSocket(ListeningSocket&& other) noexcept
-    : fd_(std::move(other.fd_)),
+    : lock_(std::move(other.lock_)),
+      fd_(std::move(other.fd_)),
       path_(std::exchange(other.path_, {})),
       device_(other.device_),
       inode_(other.inode_) {}

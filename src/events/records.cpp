@@ -16,9 +16,9 @@ using json_text::Json;
 using json_text::set_finite;
 using json_text::set_known;
 
-constexpr std::array<std::string_view, 8> kStateNames = {
-    "starting",       "running",    "camera_lost",    "camera_back",
-    "camera_stalled", "camera_end", "detector_error", "shutting_down"};
+constexpr std::array<std::string_view, 10> kStateNames = {
+    "starting",   "running",        "camera_lost", "camera_back", "camera_stalled",
+    "camera_end", "detector_error", "paused",      "map_reset",   "shutting_down"};
 /// Spread is counted in cells of the query image (report.h): 8 x 6.
 constexpr double kCells = 48;
 
@@ -28,19 +28,10 @@ Json start(std::string_view record_class, StreamPosition position) {
   return Json{{"class", record_class}, {"seq", position.seq}, {"epoch", position.epoch}};
 }
 
-/// "resumed" is true only if the client has missed nothing: this daemon keeps no history.
-Json since_json(const Since& since, StreamPosition position) {
-  Json json{{"epoch", since.epoch}, {"seq", since.seq}};
-  const bool same_epoch = since.epoch == position.epoch;
-  json["resumed"] = same_epoch && since.seq == position.seq;
-  if (!same_epoch) {
-    json["reason"] = "the daemon has restarted since; image ids and seq begin anew";
-  } else if (since.seq > position.seq) {
-    json["reason"] = "no such record yet";
-  } else if (since.seq < position.seq) {
-    json["reason"] = "this daemon keeps no history";
-    json["missed"] = position.seq - since.seq;
-  }
+Json since_json(const Since& since, const Resumed& resumed) {
+  Json json{{"epoch", since.epoch}, {"seq", since.seq}, {"resumed", resumed.complete}};
+  set_known(json, "missed", resumed.missed);
+  if (!resumed.reason.empty()) json["reason"] = resumed.reason;
   return json;
 }
 
@@ -164,7 +155,7 @@ std::string hello_text(const Identity& identity, StreamPosition position) {
 }
 
 std::string watch_text(const WatchRequest& request, const ClientPolicy& policy,
-                       StreamPosition position) {
+                       StreamPosition position, const Resumed& resumed) {
   Json json = start("watch", position);
   json["classes"] = Json::array();
   for (std::size_t i = 0; i < kRecordClasses; ++i) {
@@ -174,18 +165,24 @@ std::string watch_text(const WatchRequest& request, const ClientPolicy& policy,
     }
   }
   json["pairs"] = request.pairs;
-  if (request.since) json["since"] = since_json(*request.since, position);
+  if (request.since) json["since"] = since_json(*request.since, resumed);
   json["queue_bytes"] = policy.queue_bytes;
   json["max_line_bytes"] = policy.max_line_bytes;
   json["stalled_client_ms"] = policy.stalled_client_ms;
+  json["history_bytes"] = policy.history_bytes;
   return json_text::dump(json);
 }
 
 std::string gap_text(const Gap& gap, StreamPosition position) {
+  return gap_text(Loss{gap.count, gap.first_seq, gap.last_seq, {}}, position);
+}
+
+std::string gap_text(const Loss& loss, StreamPosition position) {
   Json json = start("gap", position);
-  json["count"] = gap.count;
-  json["first"] = gap.first_seq;
-  json["last"] = gap.last_seq;
+  set_known(json, "count", loss.count);
+  set_known(json, "first", loss.first_seq);
+  set_known(json, "last", loss.last_seq);
+  if (!loss.of_epoch.empty()) json["of_epoch"] = loss.of_epoch;
   return json_text::dump(json);
 }
 
@@ -216,6 +213,7 @@ std::string state_text(const StateRecord& record, StreamPosition position, bool 
   if (repeat) json["repeat"] = true;
   json["time_ns"] = record.time_ns;
   json["state"] = state_name(record.state);
+  if (!record.fault.empty()) json["fault"] = record.fault;
   if (!record.cause.empty()) json["cause"] = record.cause;
   if (!record.remedy.empty()) json["remedy"] = record.remedy;
   return json_text::dump(json);
@@ -237,6 +235,8 @@ std::string stats_text(const StatsRecord& record, const ServerStats& server,
   json["words_points"] = record.words_points;
   json["words_lines"] = record.words_lines;
   json["bytes"] = record.bytes;
+  json["restamped"] = record.restamped;
+  json["camera_losses"] = record.camera_losses;
   if (record.frame_rate_hz) set_finite(json, "frame_rate_hz", *record.frame_rate_hz);
   if (record.stage_means) json["mean_us"] = stage_means_json(*record.stage_means);
   json["clients"] = server.clients;

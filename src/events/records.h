@@ -18,7 +18,7 @@ namespace loopd {
 // are not UTF-8 get U+FFFD where they are wrong.
 
 inline constexpr int kProtocolMajor = 1;
-inline constexpr int kProtocolMinor = 0;
+inline constexpr int kProtocolMinor = 1;
 
 /// The kinds of record that are published and can be watched.
 enum class RecordClass : std::uint8_t { kLoop, kCandidate, kState, kStats };
@@ -48,8 +48,10 @@ class ClassSet {
 struct Identity {
   std::string version;  ///< of loopd
   std::string camera;   ///< configured name, "front"
-  std::string epoch;    ///< new at every start of the daemon; image ids and `seq` belong to it
-  std::string boot_id;  ///< /proc/sys/kernel/random/boot_id, no newline
+  /// New at every start of the daemon and whenever its map is emptied; image ids belong to it. At
+  /// most 63 bytes, or clients are not told exactly what they missed.
+  std::string epoch;
+  std::string boot_id;              ///< /proc/sys/kernel/random/boot_id, no newline
   std::string clock = "monotonic";  ///< the clock of every time_ns
 };
 
@@ -77,11 +79,13 @@ enum class State : std::uint8_t {
   kCameraStalled,  ///< the device is there but gives no frames
   kCameraEnd,      ///< a recording has come to its end
   kDetectorError,  ///< frames keep failing in the detector
+  kPaused,         ///< told to rest: images are thrown away until told to go on
+  kMapReset,       ///< all images and words were forgotten on request: the first of a new epoch
   kShuttingDown,   ///< the last record of an epoch
 };
 
 /// "starting", "running", "camera_lost", "camera_back", "camera_stalled", "camera_end",
-/// "detector_error", "shutting_down".
+/// "detector_error", "paused", "map_reset", "shutting_down".
 std::string_view state_name(State state);
 
 /// A change of the daemon's state; the newest one is the current state.
@@ -90,6 +94,7 @@ struct StateRecord {
   std::int64_t time_ns = 0;  ///< CLOCK_MONOTONIC when it began
   std::string cause;         ///< one sentence: what happened, to what, why; empty if nothing to say
   std::string remedy;        ///< what a person can do about it; empty if nothing needs doing
+  std::string fault{};       ///< stable name of what is wrong with the camera; empty if nothing is
 };
 
 /// Counters since the daemon's start, and means since the previous stats record.
@@ -106,6 +111,8 @@ struct StatsRecord {
   std::size_t words_points = 0;
   std::size_t words_lines = 0;
   std::size_t bytes = 0;                  ///< held by the detector
+  std::uint64_t restamped = 0;            ///< frames whose time of capture had to be replaced
+  std::uint64_t camera_losses = 0;        ///< times that the camera was lost
   std::optional<double> frame_rate_hz;    ///< of processed frames, since the previous record
   std::optional<StageTimes> stage_means;  ///< per frame, since the previous record
 };
@@ -140,6 +147,14 @@ struct ClientPolicy {
   std::size_t queue_bytes = 0;
   std::size_t max_line_bytes = 0;
   std::int64_t stalled_client_ms = 0;
+  std::size_t history_bytes = 0;
+};
+
+/// What `watch` answers to a `since`.
+struct Resumed {
+  bool complete = false;                ///< every record since then has been or will be sent
+  std::optional<std::uint64_t> missed;  ///< published since then, of all classes, if known
+  std::string reason;                   ///< one sentence, if not complete
 };
 
 /// Records a slow client did not get.
@@ -149,6 +164,14 @@ struct Gap {
   std::uint64_t last_seq = 0;
 };
 
+/// Records a client did not get, as told in `gap`, as far as that is known.
+struct Loss {
+  std::optional<std::uint64_t> count;      ///< of the classes it watches
+  std::optional<std::uint64_t> first_seq;  ///< they lie between these, both included
+  std::optional<std::uint64_t> last_seq;
+  std::string of_epoch{};  ///< which first_seq and last_seq belong to; empty: the current one
+};
+
 /// Which record a report becomes: loop; candidate if one reached verification and was rejected;
 /// else none.
 std::optional<RecordClass> record_class_of(const Report& report);
@@ -156,9 +179,11 @@ std::optional<RecordClass> record_class_of(const Report& report);
 // The text of one record, without the newline.
 
 std::string hello_text(const Identity& identity, StreamPosition position);
+/// `resumed`: the answer to request.since; ignored if that was not given.
 std::string watch_text(const WatchRequest& request, const ClientPolicy& policy,
-                       StreamPosition position);
+                       StreamPosition position, const Resumed& resumed = {});
 std::string gap_text(const Gap& gap, StreamPosition position);
+std::string gap_text(const Loss& loss, StreamPosition position);
 std::string error_text(std::string_view message, StreamPosition position);
 /// Precondition: record_class_of(report). `pairs`: with the inlier pairs, the long form.
 std::string report_text(const Report& report, const Latency& latency, StreamPosition position,

@@ -10,40 +10,12 @@ namespace loopd {
 namespace {
 
 using json_text::Json;
+using json_text::quote;
 
 constexpr std::array<std::string_view, kRecordClasses> kClassNames = {"loop", "candidate", "state",
                                                                       "stats"};
 constexpr std::string_view kKnownClasses = "loop, candidate, state, stats";
-/// A request needs three levels; a parser that is handed more is being tested.
-constexpr int kMaxDepth = 16;
-constexpr std::size_t kMaxQuotedBytes = 40;
-
 ParsedRequest refuse(std::string why) { return {std::nullopt, std::move(why)}; }
-
-std::string quote(const std::string& text) {
-  std::string quoted("\"");
-  quoted.append(text, 0, kMaxQuotedBytes);
-  quoted += text.size() > kMaxQuotedBytes ? "...\"" : "\"";
-  return quoted;
-}
-
-/// Deepest nesting of brackets outside strings.
-int nesting_depth(std::string_view text) {
-  int depth = 0, deepest = 0;
-  bool in_string = false;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
-    if (in_string) {
-      if (c == '\\') ++i;
-      if (c == '"') in_string = false;
-      continue;
-    }
-    if (c == '"') in_string = true;
-    if (c == '[' || c == '{') deepest = std::max(deepest, ++depth);
-    if (c == ']' || c == '}') --depth;
-  }
-  return deepest;
-}
 
 /// The violated rule, or empty with `classes` filled.
 std::string read_classes(const Json& json, ClassSet& classes) {
@@ -94,17 +66,6 @@ ParsedRequest read_watch(const Json& json) {
   return {std::move(request), {}};
 }
 
-ParsedRequest read_request(const Json& json) {
-  if (!json.is_object()) return refuse("a request must be an object like {\"op\":\"watch\"}");
-  const auto op = json.find("op");
-  if (op == json.end() || !op->is_string()) {
-    return refuse("a request must name its \"op\", like {\"op\":\"watch\"}");
-  }
-  const std::string& name = op->get_ref<const std::string&>();
-  if (name != "watch") return refuse("unknown op " + quote(name) + "; known is: watch");
-  return read_watch(json);
-}
-
 }  // namespace
 
 std::string_view record_class_name(RecordClass record_class) {
@@ -131,17 +92,10 @@ std::string request_text(const WatchRequest& request) {
 }
 
 ParsedRequest parse_request(std::string_view line) {
-  if (nesting_depth(line) > kMaxDepth) {
-    return refuse("not a request: nested deeper than " + std::to_string(kMaxDepth) + " levels");
-  }
-  try {
-    return read_request(Json::parse(line));
-  } catch (const Json::parse_error& error) {
-    return refuse("not JSON: the mistake is near byte " + std::to_string(error.byte) +
-                  " of the line");
-  } catch (const Json::exception&) {  // a number beyond double
-    return refuse("not JSON: a number is out of range");
-  }
+  json_text::ReadRequest read = json_text::read_request(line, "watch");
+  if (!read.json) return refuse(std::move(read.error));
+  if (read.op != "watch") return refuse("unknown op " + quote(read.op) + "; known is: watch");
+  return read_watch(*read.json);
 }
 
 }  // namespace loopd

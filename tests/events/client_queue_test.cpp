@@ -72,5 +72,32 @@ TEST(ClientQueue, ALongRecordThatDoesNotFitIsAGapToo) {
   EXPECT_EQ(gap->first_seq, 2u);
 }
 
+TEST(ClientQueue, KnowsWhichOfItsTextsAreRecords) {
+  ClientQueue queue(100);
+  queue.push(text("answer"));
+  EXPECT_TRUE(queue.offer(text("record"), 7));
+  EXPECT_FALSE(queue.front_seq());
+  queue.consume(6);
+  EXPECT_EQ(queue.front_seq(), 7u);
+  queue.replace_front(text("gone"));
+  EXPECT_FALSE(queue.front_seq());
+  EXPECT_EQ(queue.bytes(), 4u);
+  EXPECT_EQ(front(queue, 8), "gone");
+}
+
+TEST(ClientQueue, AGapCanBeTakenBeforeItsTime) {
+  ClientQueue queue(10);
+  EXPECT_FALSE(queue.take_gap());
+  EXPECT_TRUE(queue.offer(text("1234567890"), 1));
+  EXPECT_FALSE(queue.has_room(1));
+  EXPECT_FALSE(queue.offer(text("x"), 2));
+  const std::optional<Gap> gap = queue.take_gap();
+  ASSERT_TRUE(gap);
+  EXPECT_EQ(gap->first_seq, 2u);
+  EXPECT_FALSE(queue.take_gap());
+  EXPECT_FALSE(queue.consume(10));
+  EXPECT_TRUE(queue.has_room(1000)) << "an empty one takes anything";
+}
+
 }  // namespace
 }  // namespace loopd

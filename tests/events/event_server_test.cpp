@@ -121,18 +121,6 @@ TEST_F(EventServerTest, LatecomersAreToldTheNewestStateAndStats) {
   EXPECT_EQ(client->of_class("stats")[0]["seq"], 3);
 }
 
-TEST_F(EventServerTest, SinceIsAnswered) {
-  start();
-  publish_state();
-  const auto client = connect();
-  client->send(R"({"op":"watch","classes":["loop"],"since":{"epoch":"e1","seq":0}})"
-               "\n");
-  ASSERT_TRUE(client->wait_for("watch"));
-  const json since = client->of_class("watch")[0]["since"];
-  EXPECT_EQ(since["resumed"], false);
-  EXPECT_EQ(since["missed"], 1);
-}
-
 TEST_F(EventServerTest, ServesSixtyFourAndTurnsTheNextAway) {
   start();
   std::vector<std::unique_ptr<TestClient>> clients;

@@ -147,36 +147,37 @@ TEST(Records, HelloTextIsTheDocumentedOne) {
   const Identity identity{"0.1.0", "front", "e1", "b1", "monotonic"};
   EXPECT_EQ(hello_text(identity, kPosition),
             R"({"class":"hello","name":"loopd","version":"0.1.0",)"
-            R"("protocol":{"major":1,"minor":0},"epoch":"e1","seq":413,"camera":"front",)"
+            R"("protocol":{"major":1,"minor":1},"epoch":"e1","seq":413,"camera":"front",)"
             R"("clock":"monotonic","boot_id":"b1"})");
 }
 
 TEST(Records, WatchTextEchoesThePolicy) {
   WatchRequest request;
   request.pairs = true;
-  EXPECT_EQ(watch_text(request, {262144, 65536, 30000}, kPosition),
+  EXPECT_EQ(watch_text(request, {262144, 65536, 30000, 1048576}, kPosition),
             R"({"class":"watch","seq":413,"epoch":"e1","classes":["loop","state"],"pairs":true,)"
-            R"("queue_bytes":262144,"max_line_bytes":65536,"stalled_client_ms":30000})");
+            R"("queue_bytes":262144,"max_line_bytes":65536,"stalled_client_ms":30000,)"
+            R"("history_bytes":1048576})");
 }
 
-json echoed_since(const Since& since) {
+json echoed_since(const Resumed& resumed) {
   WatchRequest request;
-  request.since = since;
-  return json::parse(watch_text(request, {}, kPosition))["since"];
+  request.since = Since{"e0", 400};
+  return json::parse(watch_text(request, {}, kPosition, resumed))["since"];
 }
 
-TEST(Records, SinceIsAnsweredTruthfully) {
-  EXPECT_EQ(echoed_since({"e1", 413}), (json{{"epoch", "e1"}, {"seq", 413}, {"resumed", true}}));
-  const json behind = echoed_since({"e1", 400});
-  EXPECT_EQ(behind["resumed"], false);
-  EXPECT_EQ(behind["missed"], 13);
-  EXPECT_FALSE(behind["reason"].get<std::string>().empty());
-  const json ahead = echoed_since({"e1", 414});
-  EXPECT_EQ(ahead["resumed"], false);
-  EXPECT_FALSE(ahead.contains("missed"));
-  const json other = echoed_since({"e0", 413});
-  EXPECT_EQ(other["resumed"], false);
-  EXPECT_FALSE(other.contains("missed"));
+TEST(Records, SinceIsEchoedWithItsAnswer) {
+  EXPECT_EQ(echoed_since({true, 0, ""}),
+            (json{{"epoch", "e0"}, {"seq", 400}, {"resumed", true}, {"missed", 0}}));
+  EXPECT_EQ(echoed_since({false, std::nullopt, "why"}),
+            (json{{"epoch", "e0"}, {"seq", 400}, {"resumed", false}, {"reason", "why"}}));
+}
+
+TEST(Records, GapTextLeavesOutWhatIsNotKnown) {
+  EXPECT_EQ(gap_text(Loss{}, kPosition), R"({"class":"gap","seq":413,"epoch":"e1"})");
+  EXPECT_EQ(gap_text(Loss{3, 7, 12, "e0"}, kPosition),
+            R"({"class":"gap","seq":413,"epoch":"e1","count":3,"first":7,"last":12,)"
+            R"("of_epoch":"e0"})");
 }
 
 TEST(Records, StatsTextIsTheDocumentedOne) {
@@ -193,12 +194,15 @@ TEST(Records, StatsTextIsTheDocumentedOne) {
   record.words_points = 10;
   record.words_lines = 11;
   record.bytes = 12;
+  record.restamped = 15;
+  record.camera_losses = 16;
   record.frame_rate_hz = 12.5;
   record.stage_means = StageTimes{1000, 2000, 3000, 4000, 10999};
   EXPECT_EQ(stats_text(record, {13, 14}, kPosition, true),
             R"({"class":"stats","seq":413,"epoch":"e1","repeat":true,"time_ns":1,"uptime_ns":2,)"
             R"("frames":3,"dropped":4,"corrupt":5,"errors":6,"loops":7,"candidates":8,"images":9,)"
-            R"("words_points":10,"words_lines":11,"bytes":12,"frame_rate_hz":12.5,)"
+            R"("words_points":10,"words_lines":11,"bytes":12,"restamped":15,"camera_losses":16,)"
+            R"("frame_rate_hz":12.5,)"
             R"("mean_us":{"features":1,"search":2,"verify":3,"update":4,"total":10},)"
             R"("clients":13,"missed_records":14})");
   record.frame_rate_hz = kNan;
@@ -214,7 +218,9 @@ TEST(Records, EveryStateHasItsOwnName) {
   for (int i = 0; i <= static_cast<int>(State::kShuttingDown); ++i) {
     names.insert(state_name(static_cast<State>(i)));
   }
-  EXPECT_EQ(names.size(), 8u);
+  EXPECT_EQ(names.size(), 10u);
+  EXPECT_EQ(state_name(State::kPaused), "paused");
+  EXPECT_EQ(state_name(State::kMapReset), "map_reset");
   EXPECT_EQ(state_name(State::kShuttingDown), "shutting_down");
 }
 

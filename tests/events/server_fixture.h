@@ -5,10 +5,13 @@
 #include <sys/socket.h>
 #include <systemd/sd-event.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <chrono>
+#include <filesystem>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -54,11 +57,19 @@ class Loop {
   sd_event* loop_ = nullptr;
 };
 
-/// A client that reads whenever something comes (or is told not to) and keeps it.
+/// How many descriptors this process has open.
+inline std::size_t open_descriptors() {
+  const std::filesystem::directory_iterator fds("/proc/self/fd");
+  return static_cast<std::size_t>(std::distance(begin(fds), end(fds)));
+}
+
+/// A client that reads whenever something comes (or is told not to) and keeps it. On a packet
+/// socket (SOCK_SEQPACKET) each packet is one record, and each send() is one packet.
 class TestClient {
  public:
-  TestClient(const Loop& loop, const std::string& path) : loop_(loop) {
-    fd_.reset(socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  TestClient(const Loop& loop, const std::string& path, int type = SOCK_STREAM)
+      : loop_(loop), packets_(type == SOCK_SEQPACKET) {
+    fd_.reset(socket(AF_UNIX, type | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
     const sockaddr_un address = unix_address(path).value();
     const auto* generic = reinterpret_cast<const sockaddr*>(&address);
     EXPECT_EQ(connect(fd_.get(), generic, sizeof(address)), 0) << errno;
@@ -94,6 +105,7 @@ class TestClient {
     fd_.reset();
   }
 
+  int fd() const { return fd_.get(); }
   bool ended() const { return ended_; }
   /// All complete records so far.
   const std::vector<json>& records() const { return records_; }
@@ -112,10 +124,11 @@ class TestClient {
            count(record_class) >= n;
   }
   bool watch(std::string_view classes, bool pairs = false) {
-    const std::size_t before = count("watch");
-    send(R"({"op":"watch","classes":[)" + std::string(classes) + R"(],"pairs":)" +
-         (pairs ? "true" : "false") + "}\n");
-    return wait_for("watch", before + 1);
+    return ask_to_watch(classes, pairs ? R"("pairs":true)" : R"("pairs":false)");
+  }
+  bool watch_since(std::string_view classes, const std::string& epoch, std::uint64_t seq) {
+    return ask_to_watch(
+        classes, R"("since":{"epoch":")" + epoch + R"(","seq":)" + std::to_string(seq) + "}");
   }
 
  private:
@@ -123,13 +136,24 @@ class TestClient {
     static_cast<TestClient*>(self)->receive();
     return 0;
   }
+  bool ask_to_watch(std::string_view classes, const std::string& more) {
+    const std::size_t before = count("watch");
+    send(R"({"op":"watch","classes":[)" + std::string(classes) + "]," + more +
+         (packets_ ? "}" : "}\n"));
+    return wait_for("watch", before + 1);
+  }
+
   void receive() {
-    std::array<char, 65536> bytes;
+    std::vector<char> bytes(std::max<std::size_t>(65536, waiting_packet_bytes()));
     const ssize_t n = recv(fd_.get(), bytes.data(), bytes.size(), 0);
     if (n < 0 && errno == EAGAIN) return;
     if (n <= 0) {
       ended_ = true;
       stop_reading();
+      return;
+    }
+    if (packets_) {
+      records_.push_back(json::parse(std::string_view(bytes.data(), static_cast<std::size_t>(n))));
       return;
     }
     text_.append(bytes.data(), static_cast<std::size_t>(n));
@@ -140,7 +164,13 @@ class TestClient {
     text_.erase(0, start);
   }
 
+  std::size_t waiting_packet_bytes() const {
+    const ssize_t n = packets_ ? recv(fd_.get(), nullptr, 0, MSG_PEEK | MSG_TRUNC) : 0;
+    return n > 0 ? static_cast<std::size_t>(n) : 0;
+  }
+
   const Loop& loop_;
+  const bool packets_;
   UniqueFd fd_;
   sd_event_source* source_ = nullptr;
   std::string text_;
@@ -153,9 +183,9 @@ class ServerTest : public ::testing::Test {
  protected:
   ServerTest() { options_.socket_path = (dir_ / "events.sock").string(); }
 
-  void start() {
-    Result<std::unique_ptr<EventServer>> server =
-        EventServer::listen(loop_.get(), options_, {"0.1.0", "front", "e1", "b1", "monotonic"});
+  void start(const std::string& epoch = "e1", InheritedSockets* inherited = nullptr) {
+    Result<std::unique_ptr<EventServer>> server = EventServer::listen(
+        loop_.get(), options_, {"0.1.0", "front", epoch, "b1", "monotonic"}, inherited);
     ASSERT_TRUE(server.ok()) << server.error().message;
     server_ = std::move(server).value();
   }
