@@ -49,6 +49,9 @@ class Detector {
   /// the waiting window becomes searchable. Fills update_ns, words and bytes of `report`.
   void absorb(Report& report);
 
+  /// Forgets everything: from now on as newly made, image ids from 0 again. Thread: as process().
+  void clear();
+
   /// Features of the newest processed frame, or of a searchable image; null if `image` is neither.
   /// Valid until the next call of process() or absorb().
   const Features* features(ImageId image) const;
@@ -57,6 +60,8 @@ class Detector {
   std::size_t bytes() const;
 
  private:
+  const Config config_;
+  LaneExecutor* const lanes_;
   class Impl;
   std::unique_ptr<Impl> impl_;
 };

@@ -32,10 +32,9 @@ std::string remedy_for(CameraFault fault) {
 
 }  // namespace
 
-void CaptureLoop::run() {
-  while (std::visit([this](auto&& event) { return handle(std::move(event)); }, camera_.next())) {
+void CaptureLoop::run(Camera& camera) {
+  while (std::visit([this](auto&& event) { return handle(std::move(event)); }, camera.next())) {
   }
-  mailbox_.close();
 }
 
 bool CaptureLoop::handle(Frame frame) {
@@ -43,8 +42,11 @@ bool CaptureLoop::handle(Frame frame) {
   if (state_ != State::kRunning && state_ != State::kCameraBack) {
     state_ = state_.has_value() ? State::kCameraBack : State::kRunning;
     counters_.away = false;
-    tell({LogLevel::kNotice, {*state_, monotonic_now_ns(), "frames arrive", ""}});
+    tell({LogLevel::kNotice,
+          {*state_, monotonic_now_ns(), "frames arrive", ""},
+          Notice::Kind::kState});
   }
+  tap_.offer(frame);
   return lock_step_ ? mailbox_.put_when_empty(std::move(frame)) : mailbox_.put(std::move(frame));
 }
 
@@ -59,21 +61,35 @@ bool CaptureLoop::handle(const CameraError& error) {
 bool CaptureLoop::handle(const CameraNotice& notice) {
   const LogLevel level =
       notice.kind == CameraNotice::Kind::kOpened ? LogLevel::kInfo : LogLevel::kWarning;
-  tell({level, {State::kRunning, monotonic_now_ns(), notice.message, ""}, false});
+  tell({level, {State::kRunning, monotonic_now_ns(), notice.message, ""}, Notice::Kind::kCamera});
   return true;
 }
 
 bool CaptureLoop::handle(EndOfStream) {
   counters_.away = true;
   counters_.ended = true;  // told by the detect thread once it has worked on the last frame
+  mailbox_.close();
   return false;
 }
 
 void CaptureLoop::camera_away(const CameraError& error) {
-  if (state_ == state_of(error)) return;
+  if (!is_news(error)) return;
+  if (!counters_.away.exchange(true)) counters_.losses.fetch_add(1, std::memory_order_relaxed);
   state_ = state_of(error);
-  counters_.away = true;
-  tell({LogLevel::kWarning, {*state_, monotonic_now_ns(), error.message, remedy_for(error.fault)}});
+  fault_ = error.fault;
+  tell({LogLevel::kWarning,
+        {*state_, monotonic_now_ns(), error.message, remedy_for(error.fault),
+         std::string(camera_fault_name(error.fault))},
+        Notice::Kind::kState});
+}
+
+/// Not every answer of a camera that is away: only another state or another cause. That a camera
+/// just unplugged is not there is no other cause.
+bool CaptureLoop::is_news(const CameraError& error) const {
+  if (state_ != state_of(error)) return true;
+  const bool still_unplugged =
+      fault_ == CameraFault::kUnplugged && error.fault == CameraFault::kNoDevice;
+  return fault_ != error.fault && !still_unplugged;
 }
 
 void CaptureLoop::frame_lost(const CameraError& error) {
@@ -82,7 +98,8 @@ void CaptureLoop::frame_lost(const CameraError& error) {
   const std::int64_t now_ns = monotonic_now_ns();
   if (told_ns && now_ns - *told_ns < kLogInterval_ns) return;
   told_ns = now_ns;
-  tell({LogLevel::kWarning, {State::kRunning, now_ns, error.message, ""}, false});
+  tell(
+      {LogLevel::kWarning, {State::kRunning, now_ns, error.message, ""}, Notice::Kind::kFrameLost});
 }
 
 void CaptureLoop::tell(const Notice& notice) {

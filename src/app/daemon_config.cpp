@@ -26,16 +26,40 @@ const std::array kOwnParameters = {
         "digits, - and _.",
         LOOPD_REF(camera.name)},
     Row{"camera.source", "", 1, 16,
-        "Kind of camera. \"file\": a folder of images, or a video, stands in for one.",
+        "Kind of camera. \"v4l2\": a camera of the kernel, such as a USB camera. \"libcamera\": "
+        "one "
+        "that libcamera drives. \"file\": recorded images stand in for one.",
         LOOPD_REF(camera.source)},
     Row{"camera.path", "", 0, 4096,
-        "The folder of images (or a dataset folder with images/ in it), the image or the video. "
-        "The daemon does not start without one.",
+        "Which one. v4l2: a device (/dev/video0, or a link of /dev/v4l/by-id, which stays with the "
+        "camera), or serial:NUMBER. libcamera: its id, or a part of it; empty = the only one. "
+        "file: "
+        "a folder of images (or a dataset folder with images/ in it), an image, a video, or what "
+        "loopctl record wrote.",
         LOOPD_REF(camera.path)},
+    Row{"camera.width", "px", 0, 16'384,
+        "Wished of a live camera, which gives the nearest it has; 0 = as the driver is set. More "
+        "than "
+        "features.max_pixels is only work.",
+        LOOPD_REF(camera.width)},
+    Row{"camera.height", "px", 0, 16'384, "As camera.width.", LOOPD_REF(camera.height)},
     Row{"camera.fps", "frames/s", 0, 1000,
-        "Rate in real time: the newest frame wins, older ones are dropped and counted. 0 = "
-        "lock-step: the source waits for the detector, nothing is dropped; for replay and tests.",
+        "Live: the rate wished, 0 = the driver's own. File: the rate in real time, the newest "
+        "frame "
+        "wins, older ones are dropped and counted; 0 = lock-step: the source waits for the "
+        "detector, "
+        "nothing is dropped.",
         LOOPD_REF(camera.fps)},
+    Row{"camera.format", "", 1, 8,
+        "Pixel format of a live camera by its four letters (GREY, YUYV, NV12, MJPG, ...); \"auto\" "
+        "= "
+        "the one that costs least among those that reach size and rate.",
+        LOOPD_REF(camera.format)},
+    Row{"camera.controls", "", 0, 4096,
+        "Controls of a live camera, such as \"auto_exposure=1 exposure_time_absolute=80 gain=20\", "
+        "set in this order each time it is opened. Names: v4l2-ctl -L, or cam --list-controls. A "
+        "short exposure blurs less when the robot turns.",
+        LOOPD_REF(camera.controls)},
     Row{"camera.nominal_fps", "frames/s", 0, 1000,
         "In lock-step, the rate from which frame times are made where the recording has none; 0 = "
         "that of a video, no times for images.",
@@ -93,8 +117,12 @@ const std::array kOwnParameters = {
 
     Row{"events.socket", "", 0, kLongestSocketPath,
         "Path of the event socket; empty = /run/loopd/<camera.name>/events.sock. The kernel takes "
-        "no longer one.",
+        "no longer one. Its twin for whole packets stands beside it, as events.seqpacket.",
         LOOPD_REF(events.socket)},
+    Row{"events.control_socket", "", 0, kLongestSocketPath,
+        "Path of the socket for those who may change what the daemon does, its owner and group; "
+        "empty = control.sock beside the event socket.",
+        LOOPD_REF(events.control_socket)},
     Row{"events.max_clients", "clients", 1, 1024, "One more is told so and closed.",
         LOOPD_REF(events.max_clients)},
     Row{"events.client_queue_kib", "KiB", 4, 65'536,
@@ -106,6 +134,9 @@ const std::array kOwnParameters = {
     Row{"events.stats_interval_s", "s", 0.05, 3600,
         "Between two records of counters, and between two updates of the service's status.",
         LOOPD_REF(events.stats_interval_s)},
+    Row{"events.history_kib", "KiB", 0, 1'048'576,
+        "Newest records that are kept for clients that connect again; 0 = none.",
+        LOOPD_REF(events.history_kib)},
     Row{"events.report_queue", "reports", 4, 1024,
         "Reports on their way from the detector to the socket, about 84 KiB each. In real time "
         "what does not fit is dropped and counted, rejected candidates first; in lock-step the "
@@ -143,6 +174,26 @@ bool is_name_character(char c) {
          c == '_';
 }
 
+std::string violation(std::string_view key, const std::string& value, std::string_view rule) {
+  return std::string(key) + " = " + toml_string(value) +
+         ". Violated constraint: " + std::string(key) + " " + std::string(rule);
+}
+
+std::vector<std::string> camera_violations(const CameraConfig& camera) {
+  constexpr std::array<std::string_view, 3> kSources = {"file", "v4l2", "libcamera"};
+  std::vector<std::string> violations;
+  if (std::ranges::find(kSources, camera.source) == kSources.end())
+    violations.push_back(
+        violation("camera.source", camera.source, "is \"file\", \"v4l2\" or \"libcamera\""));
+  if (std::ranges::any_of(camera_controls(camera), [](const auto& c) { return c.first.empty(); }))
+    violations.push_back(violation("camera.controls", camera.controls,
+                                   "is a list of name=value, separated by spaces"));
+  if (camera.live() && !camera.faults.empty())
+    violations.push_back(
+        violation("camera.faults", camera.faults, "is empty, but for camera.source = \"file\""));
+  return violations;
+}
+
 }  // namespace
 
 std::span<const Parameter<DaemonConfig>> daemon_parameters() {
@@ -159,24 +210,48 @@ std::vector<std::string> validate(const DaemonConfig& config) {
   if (!std::ranges::all_of(config.camera.name, is_name_character))
     violations.push_back("camera.name = " + toml_string(config.camera.name) +
                          ". Violated constraint: camera.name holds only letters, digits, - and _");
-  if (config.camera.source != "file")
-    violations.push_back("camera.source = " + toml_string(config.camera.source) +
-                         ". Violated constraint: camera.source is \"file\", the only kind of "
-                         "camera this version has");
+  for (std::string& text : camera_violations(config.camera)) violations.push_back(std::move(text));
   for (std::string& text : validate(config.detector)) violations.push_back(std::move(text));
   return violations;
 }
 
 std::vector<std::string> missing_for_daemon(const DaemonConfig& config) {
-  if (!config.camera.path.empty()) return {};
+  if (!config.camera.path.empty() || config.camera.source == "libcamera") return {};
+  if (config.camera.source == "v4l2")
+    return {
+        "camera.path is not set: give a device such as /dev/video0, in the config file or with "
+        "--set camera.path=PATH; loopctl cameras lists what is there"};
   return {
       "camera.path is not set: give a folder of images or a video, in the config file or with "
-      "--set camera.path=PATH"};
+      "--set camera.path=PATH; for a camera, set camera.source too"};
 }
 
 std::string event_socket_path(const DaemonConfig& config) {
   if (!config.events.socket.empty()) return config.events.socket;
   return "/run/loopd/" + config.camera.name + "/events.sock";
+}
+
+std::string control_socket_path(const DaemonConfig& config) {
+  if (!config.events.control_socket.empty()) return config.events.control_socket;
+  const std::string events = event_socket_path(config);
+  return events.substr(0, events.rfind('/') + 1) + "control.sock";
+}
+
+std::vector<std::pair<std::string, std::string>> camera_controls(const CameraConfig& camera) {
+  constexpr std::string_view kSeparators = " ";
+  const std::string_view text = camera.controls;
+  std::vector<std::pair<std::string, std::string>> controls;
+  std::size_t begin = text.find_first_not_of(kSeparators);
+  while (begin != std::string_view::npos) {
+    const std::size_t end = std::min(text.find_first_of(kSeparators, begin), text.size());
+    const std::string_view item = text.substr(begin, end - begin);
+    const std::size_t equals = std::min(item.find('='), item.size());
+    const bool complete = equals > 0 && equals + 1 < item.size();
+    controls.emplace_back(complete ? item.substr(0, equals) : "",
+                          complete ? item.substr(equals + 1) : "");
+    begin = text.find_first_not_of(kSeparators, end);
+  }
+  return controls;
 }
 
 }  // namespace loopd

@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "loopd/config.h"
@@ -16,7 +17,11 @@ struct CameraConfig {
   std::string name = "front";
   std::string source = "file";
   std::string path;
+  int width = 640;
+  int height = 480;
   double fps = 0;
+  std::string format = "auto";
+  std::string controls;
   double nominal_fps = 0;
   bool loop = false;
   int start = 0;
@@ -26,8 +31,10 @@ struct CameraConfig {
   int max_pixels = 12'582'912;
   int buffers = 4;
 
+  /// A real camera, which comes and goes; else a recording.
+  bool live() const { return source != "file"; }
   /// The source waits for the detector and nothing is dropped.
-  bool lock_step() const { return fps == 0; }
+  bool lock_step() const { return !live() && fps == 0; }
 };
 
 /// CPUs (empty: all the process may use) and real-time priority (0: none) of each thread.
@@ -44,13 +51,15 @@ struct ThreadsConfig {
   bool required = false;
 };
 
-/// The event socket.
+/// The sockets.
 struct EventsConfig {
   std::string socket;
+  std::string control_socket;
   int max_clients = 64;
   int client_queue_kib = 256;
   double stalled_client_s = 30;
   double stats_interval_s = 5;
+  int history_kib = 1024;
   int report_queue = 16;
 };
 
@@ -75,5 +84,12 @@ std::vector<std::string> missing_for_daemon(const DaemonConfig& config);
 
 /// events.socket, or where the socket is if that is empty: /run/loopd/<camera.name>/events.sock.
 std::string event_socket_path(const DaemonConfig& config);
+
+/// events.control_socket, or control.sock in the folder of the event socket.
+std::string control_socket_path(const DaemonConfig& config);
+
+/// camera.controls, "name=value" separated by spaces, taken apart; what is not of this
+/// form has an empty name.
+std::vector<std::pair<std::string, std::string>> camera_controls(const CameraConfig& camera);
 
 }  // namespace loopd

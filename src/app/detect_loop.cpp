@@ -10,20 +10,56 @@ namespace loopd {
 
 void DetectLoop::run() {
   while (std::optional<Frame> frame = mailbox_.take()) {
+    const bool thrown_away = held_back();
     if (stopping_) return;
-    work_on(*std::move(frame));
+    if (!thrown_away) work_on(*std::move(frame));
   }
   // Only now are all reports of the recording handed over.
   if (capture_.ended && !stopping_)
     tell(LogLevel::kNotice, State::kCameraEnd, "the recording is at its end");
 }
 
+void DetectLoop::stop() {
+  stopping_ = true;
+  resume();
+}
+
+void DetectLoop::pause() {
+  const std::lock_guard lock(pause_mutex_);
+  paused_ = true;
+}
+
+void DetectLoop::resume() {
+  {
+    const std::lock_guard lock(pause_mutex_);
+    paused_ = false;
+  }
+  pause_ended_.notify_all();
+}
+
+bool DetectLoop::held_back() {
+  std::unique_lock lock(pause_mutex_);
+  if (!paused_) return false;
+  if (!live_times_) {
+    pause_ended_.wait(lock, [this] { return !paused_; });
+    return false;
+  }
+  const std::lock_guard totals_lock(totals_mutex_);
+  ++totals_.skipped;
+  return true;
+}
+
 void DetectLoop::work_on(Frame frame) {
+  if (const std::uint32_t wanted = wanted_map_; wanted != map_) {
+    detector_.clear();
+    map_ = wanted;
+    wakeup_.wake();
+  }
   const std::int64_t taken_ns = monotonic_now_ns();
   detector_.process(frame, report_);
   frame.buffer.reset();  // the camera may have it back while the map is brought up to date
   if (record_class_of(report_)) {
-    reports_.give(report_, taken_ns, live_times_ ? report_.time_ns : std::nullopt);
+    reports_.give(report_, {taken_ns, live_times_ ? report_.time_ns : std::nullopt, map_});
     wakeup_.wake();
   }
   detector_.absorb(report_);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <condition_variable>
 #include <cstdint>
 #include <mutex>
 #include <optional>
@@ -21,6 +22,7 @@ struct DetectTotals {
   std::uint64_t errors_in_row = 0;
   std::uint64_t loops = 0;
   std::uint64_t candidates = 0;  ///< reached verification and were rejected
+  std::uint64_t skipped = 0;     ///< taken from the mailbox and thrown away while paused
   StageTimes times;              ///< summed over all frames
   std::size_t images = 0;        ///< of the newest frame, as the next three
   std::size_t words_points = 0;
@@ -30,7 +32,7 @@ struct DetectTotals {
 
 /// The detect thread's work: the newest frame, process, hand the report over, wake main, absorb.
 /// Does no I/O and logs nothing per frame.
-/// Thread: run() is the body of the detect thread; stop() and totals() by any.
+/// Thread: run() is the body of the detect thread; everything else by any.
 class DetectLoop {
  public:
   /// So many frames in a row that fail in the detector are a broken detector, not broken frames.
@@ -50,11 +52,22 @@ class DetectLoop {
 
   /// Returns when the mailbox is closed and empty, or after the current frame once stopped.
   void run();
-  void stop() { stopping_ = true; }
+  void stop();
   /// A consistent copy.
   DetectTotals totals() const;
 
+  /// While paused no frame is worked on: of a live camera they are thrown away, a recording waits.
+  void pause();
+  void resume();
+  /// Empties the map before the next frame. Reports are marked with the number of resets before
+  /// them (TakenReport::map), so that none is taken for one of another map.
+  void reset() { wanted_map_.fetch_add(1, std::memory_order_relaxed); }
+  /// Resets done. Read before reports are taken, it tells that those of older maps are all there.
+  std::uint32_t map() const { return map_; }
+
  private:
+  /// True if the frame is thrown away. Waits while a recording is paused.
+  bool held_back();
   void work_on(Frame frame);
   void add_to_totals(const Report& report);
   void watch_errors();
@@ -68,6 +81,11 @@ class DetectLoop {
   const CaptureCounters& capture_;
   const bool live_times_;
   std::atomic<bool> stopping_ = false;
+  std::atomic<std::uint32_t> wanted_map_ = 0;
+  std::atomic<std::uint32_t> map_ = 0;  ///< written by the detect thread alone
+  std::mutex pause_mutex_;
+  std::condition_variable pause_ended_;
+  bool paused_ = false;
   bool failing_ = false;
   Report report_;
   mutable std::mutex totals_mutex_;

@@ -36,27 +36,38 @@ Status EventLoop::on_signal(int signal, Action action) {
 
 Status EventLoop::on_readable(int fd, Action action) {
   Source& source = add(std::move(action));
+  source.fd = fd;
   return status_of(sd_event_add_io(event_, &source.source, fd, EPOLLIN, &readable, &source),
                    "watch file descriptor " + std::to_string(fd));
 }
 
-Status EventLoop::every(std::uint64_t interval_us, Action action) {
+void EventLoop::forget(int fd) {
+  for (Source& source : sources_) {
+    if (source.fd != fd || source.source == nullptr) continue;
+    source.source = sd_event_source_disable_unref(source.source);
+    source.forgotten = true;  // removed later: its action may be under way
+  }
+}
+
+Status EventLoop::every(std::function<std::uint64_t()> interval_us, Action action) {
   constexpr std::uint64_t kAccuracy_us = 10'000;
   Source& source = add(std::move(action));
-  source.interval_us = interval_us;
-  return status_of(sd_event_add_time_relative(event_, &source.source, CLOCK_MONOTONIC, interval_us,
-                                              kAccuracy_us, &elapsed, &source),
-                   "set a timer");
+  source.interval_us = std::move(interval_us);
+  return status_of(
+      sd_event_add_time_relative(event_, &source.source, CLOCK_MONOTONIC, source.interval_us(),
+                                 kAccuracy_us, &elapsed, &source),
+      "set a timer");
 }
 
 Status EventLoop::run_once(std::uint64_t timeout_us) {
+  sources_.remove_if([](const Source& source) { return source.forgotten; });
   const int result = sd_event_run(event_, timeout_us);
   if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
   return status_of(result, "run the event loop");
 }
 
 EventLoop::Source& EventLoop::add(Action action) {
-  return sources_.emplace_back(Source{this, nullptr, std::move(action), 0});
+  return sources_.emplace_back(Source{this, nullptr, std::move(action)});
 }
 
 void EventLoop::call(Source& source) {
@@ -82,7 +93,7 @@ int EventLoop::readable(sd_event_source*, int, std::uint32_t, void* source) {
 int EventLoop::elapsed(sd_event_source* timer, std::uint64_t, void* source) {
   auto& self = *static_cast<Source*>(source);
   self.loop->call(self);
-  const int result = sd_event_source_set_time_relative(timer, self.interval_us);
+  const int result = sd_event_source_set_time_relative(timer, self.interval_us());
   return result < 0 ? result : sd_event_source_set_enabled(timer, SD_EVENT_ONESHOT);
 }
 

@@ -28,11 +28,13 @@ class EventLoop {
 
   /// Calls `action` for each arrival of `signal`, which must be blocked in every thread.
   Status on_signal(int signal, Action action);
-  /// Calls `action` while `fd` is readable.
+  /// Calls `action` while `fd` is readable, until forget(fd), which comes before it is closed.
   Status on_readable(int fd, Action action);
-  /// Calls `action` every `interval_us`, the first time after one interval. Late calls are not
-  /// made up for.
-  Status every(std::uint64_t interval_us, Action action);
+  /// No more calls for `fd`; may be called by its own action. No-op if nothing waits for it.
+  void forget(int fd);
+  /// Calls `action` every `interval_us()`, asked for anew each time, the first time after one
+  /// interval. Late calls are not made up for.
+  Status every(std::function<std::uint64_t()> interval_us, Action action);
 
   /// Waits for events, at most `timeout_us`, and handles one.
   Status run_once(std::uint64_t timeout_us = UINT64_MAX);
@@ -42,7 +44,9 @@ class EventLoop {
     EventLoop* loop = nullptr;
     sd_event_source* source = nullptr;
     Action action;
-    std::uint64_t interval_us = 0;
+    std::function<std::uint64_t()> interval_us{};
+    int fd = -1;             ///< of on_readable()
+    bool forgotten = false;  ///< to be removed
   };
 
   explicit EventLoop(sd_event* event) : event_(event) {}

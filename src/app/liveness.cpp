@@ -7,7 +7,7 @@
 namespace loopd {
 
 bool Liveness::alive(const Vitals& vitals, std::int64_t now_ns) {
-  const bool idle_for_a_reason = vitals.camera_away && !vitals.work_pending;
+  const bool idle_for_a_reason = vitals.nothing_to_do && !vitals.work_pending;
   if (vitals.frames_detected != frames_seen_ || idle_for_a_reason) advanced_ns_ = now_ns;
   frames_seen_ = vitals.frames_detected;
   if (vitals.errors_in_row >= DetectLoop::kMostErrorsInRow) return false;

@@ -8,8 +8,8 @@ namespace loopd {
 struct Vitals {
   std::uint64_t frames_detected = 0;
   std::uint64_t errors_in_row = 0;
-  bool work_pending = false;  ///< frames wait for the detector or are in it
-  bool camera_away = false;   ///< known to be lost, stalled or ended, or not started yet
+  bool work_pending = false;   ///< frames wait for the detector or are in it
+  bool nothing_to_do = false;  ///< the camera is known to be away, not started yet, or paused
 };
 
 /// Decides whether the watchdog may be fed: detection advances, or there is nothing to detect and

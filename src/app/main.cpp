@@ -58,9 +58,19 @@ void block_signals() {
   signal(SIGPIPE, SIG_IGN);
 }
 
-int run_daemon(const DaemonConfig& config, const Log& log) {
+/// The config file with what the command line sets over it.
+LoadedConfig read_config(const CommandLine& line) {
+  LoadedConfig loaded = load_config(line.config_path, line.sets);
+  if (!line.print_config)
+    for (std::string& missing : missing_for_daemon(loaded.config))
+      loaded.mistakes.push_back(std::move(missing));
+  return loaded;
+}
+
+int run_daemon(const DaemonConfig& config, const CommandLine& line, const Log& log) {
   block_signals();
-  auto daemon = Daemon::start(config, log, LOOPD_VERSION);
+  auto daemon = Daemon::start(
+      config, [&line] { return read_config(line); }, log, LOOPD_VERSION);
   if (!daemon) {
     log.error(daemon.error().message);
     return kFailed;
@@ -76,16 +86,13 @@ int run_daemon(const DaemonConfig& config, const Log& log) {
 int run(int argc, char** argv, const Log& log) {
   CommandLine line;
   if (const auto exit_code = parse(argc, argv, line)) return *exit_code;
-  LoadedConfig loaded = load_config(line.config_path, line.sets);
-  if (!line.print_config)
-    for (std::string& missing : missing_for_daemon(loaded.config))
-      loaded.mistakes.push_back(std::move(missing));
+  const LoadedConfig loaded = read_config(line);
   for (const std::string& mistake : loaded.mistakes) log.error(mistake);
   if (!loaded.ok()) return kBadSettings;
   if (line.print_config || line.check) std::cout << config_as_toml(loaded.config);
   if (line.check) std::cout << "\n" << memory_text(memory_plan(loaded.config));
   if (line.print_config || line.check) return std::cout.flush() ? kEnded : kFailed;
-  return run_daemon(loaded.config, log);
+  return run_daemon(loaded.config, line, log);
 }
 
 }  // namespace

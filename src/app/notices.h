@@ -12,9 +12,16 @@ namespace loopd {
 
 /// Something a worker thread has to say to the log and, if it is a change of state, to clients.
 struct Notice {
+  enum class Kind : std::uint8_t {
+    kState,      ///< a change of state, for clients too
+    kFrameLost,  ///< for the log only, as the rest; record.state means nothing
+    kCamera,     ///< something about the camera that changes no state
+  };
   LogLevel level = LogLevel::kNotice;
   StateRecord record;
-  bool is_state = true;  ///< false: for the log only; record.state means nothing
+  Kind kind = Kind::kState;
+
+  bool is_state() const { return kind == Kind::kState; }
 };
 
 /// Carries notices from the worker threads to the event loop. Drop policy: the oldest gives way,

@@ -1,23 +1,13 @@
 #include "app/pipeline.h"
 
+#include <cassert>
 #include <exception>
 #include <utility>
 
-#include "capture/file_camera.h"
+#include "app/camera_factory.h"
 
 namespace loopd {
 namespace {
-
-FileCameraOptions file_camera_options(const CameraConfig& camera) {
-  FileCameraOptions options;
-  options.path = camera.path;
-  options.fps = camera.fps;
-  options.loop = camera.loop;
-  options.start = camera.start;
-  options.nominal_fps = camera.nominal_fps;
-  options.faults = camera.faults;
-  return options;
-}
 
 ThreadOptions thread_options(const char* name, const std::vector<int>& cpus, int priority,
                              bool required) {
@@ -47,7 +37,7 @@ struct Pipeline::Parts {
 Result<std::unique_ptr<Pipeline>> Pipeline::open(const DaemonConfig& config) {
   auto pool = std::make_unique<FramePool>(static_cast<std::size_t>(config.camera.buffers),
                                           static_cast<std::size_t>(config.camera.max_pixels));
-  auto camera = open_file_camera(file_camera_options(config.camera), *pool);
+  auto camera = open_camera(config.camera, *pool);
   if (!camera) return camera.error();
   auto wakeup = Wakeup::make();
   if (!wakeup) return wakeup.error();
@@ -72,7 +62,7 @@ Pipeline::Pipeline(const DaemonConfig& config, Parts parts)
       wakeup_(std::move(parts.wakeup)),
       reports_(static_cast<std::size_t>(config.events.report_queue), config.camera.lock_step()),
       detector_(config.detector, lanes_.get()),
-      capture_(*camera_, mailbox_, notices_, wakeup_, capture_counters_, config.camera.lock_step()),
+      capture_(mailbox_, tap_, notices_, wakeup_, capture_counters_, config.camera.lock_step()),
       detect_(detector_, mailbox_, reports_, notices_, wakeup_, capture_counters_,
               !config.camera.lock_step()) {}
 
@@ -84,10 +74,29 @@ Status Pipeline::start() {
       thread_options("detect", threads_.detect_cpus, threads_.detect_priority, threads_.required),
       [this] { detect_.run(); });
   if (!detect) return detect;
+  return start_capture();
+}
+
+Status Pipeline::start_capture() {
   return start_thread(capture_thread_,
                       thread_options("capture", threads_.capture_cpus, threads_.capture_priority,
                                      threads_.required),
-                      [this] { capture_.run(); });
+                      [this] { capture_.run(*camera_); });
+}
+
+Status Pipeline::replace_camera(const CameraConfig& config) {
+  assert(config.live() && "a recording has an end, after which nothing can follow");
+  // In this order: a device is busy as long as the camera before has it.
+  camera_->interrupt();
+  capture_thread_.join();
+  dropped_before_ += camera_->dropped();
+  restamped_before_ += camera_->restamped();
+  camera_.reset();
+  capture_counters_.away = true;  // no frame is owed until the new one gives its first
+  auto camera = open_camera(config, *pool_);
+  assert(camera.ok() && "a live camera need not be there");
+  camera_ = std::move(camera).value();
+  return start_capture();
 }
 
 Status Pipeline::start_thread(NamedThread& thread, const ThreadOptions& options,
@@ -121,7 +130,8 @@ NamedThread::OnException Pipeline::on_exception() {
 bool Pipeline::work_pending() const {
   // Read in this order, what is still pending may be missed for a moment but never made up.
   const std::uint64_t delivered = capture_counters_.frames;
-  return delivered > mailbox_.overwritten() + totals().frames;
+  const DetectTotals done = totals();
+  return delivered > mailbox_.overwritten() + done.frames + done.skipped;
 }
 
 std::optional<std::string> Pipeline::failure() const {

@@ -38,6 +38,17 @@ class Pipeline {
 
   /// Starts to take frames; once only. Error: a thread cannot start.
   Status start();
+  /// Goes on with another live camera, or the same with other settings; map and detector stay.
+  /// Waits until the old one is closed, a second at most but for a driver that hangs. Error: no
+  /// thread. Precondition: started, and `config` is live.
+  Status replace_camera(const CameraConfig& config);
+  /// See DetectLoop.
+  void pause() { detect_.pause(); }
+  void resume() { detect_.resume(); }
+  void reset_map() { detect_.reset(); }
+  std::uint32_t map() const { return detect_.map(); }
+  /// Where a recording listens for frames, those too that the detector never sees.
+  RecordingTap& recording_tap() { return tap_; }
   /// Ends capture, then detection after its current frame, and joins both. What was handed over
   /// before can still be taken. May be called any number of times.
   void stop();
@@ -51,7 +62,11 @@ class Pipeline {
   DetectTotals totals() const { return detect_.totals(); }
   const CaptureCounters& capture() const { return capture_counters_; }
   /// Frames that never reached the detector, by whoever's fault.
-  std::uint64_t dropped_frames() const { return camera_->dropped() + mailbox_.overwritten(); }
+  std::uint64_t dropped_frames() const {
+    return dropped_before_ + camera_->dropped() + mailbox_.overwritten();
+  }
+  /// Frames whose time stamp was replaced, see Camera::restamped().
+  std::uint64_t restamped_frames() const { return restamped_before_ + camera_->restamped(); }
   /// Frames that wait for the detector or are in it.
   bool work_pending() const;
   std::uint64_t dropped_reports() const { return reports_.dropped(); }
@@ -65,6 +80,7 @@ class Pipeline {
   struct Parts;
   Pipeline(const DaemonConfig& config, Parts parts);
   NamedThread::OnException on_exception();
+  Status start_capture();
   Status start_thread(NamedThread& thread, const ThreadOptions& options,
                       std::function<void()> body);
 
@@ -75,9 +91,12 @@ class Pipeline {
   std::unique_ptr<TwoLanes> lanes_;  ///< null: one lane
   Wakeup wakeup_;
   Mailbox<Frame> mailbox_;
+  RecordingTap tap_;
   NoticeQueue notices_;
   ReportQueue reports_;
   CaptureCounters capture_counters_;
+  std::uint64_t dropped_before_ = 0;    ///< by the cameras before this one
+  std::uint64_t restamped_before_ = 0;  ///< likewise
   Detector detector_;
   CaptureLoop capture_;
   DetectLoop detect_;

@@ -7,16 +7,14 @@ ReportQueue::ReportQueue(std::size_t slots, bool blocking)
   for (TakenReport& slot : slots_) free_.try_push(&slot);
 }
 
-bool ReportQueue::give(const Report& report, std::int64_t taken_ns,
-                       std::optional<std::int64_t> captured_ns) {
+bool ReportQueue::give(const Report& report, const ReportOrigin& origin) {
   TakenReport* const slot = free_slot(report.outcome);
   if (slot == nullptr) {
     dropped_.fetch_add(1, std::memory_order_relaxed);
     return false;
   }
   slot->report = report;
-  slot->taken_ns = taken_ns;
-  slot->captured_ns = captured_ns;
+  slot->origin = origin;
   return given_.try_push(slot);  // never full: there are as many places as slots
 }
 

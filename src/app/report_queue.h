@@ -12,12 +12,18 @@
 
 namespace loopd {
 
-/// A report on its way to the clients, with the times that only its giver knows.
-struct TakenReport {
-  Report report;
+/// What only the giver of a report knows of it.
+struct ReportOrigin {
   std::int64_t taken_ns = 0;  ///< CLOCK_MONOTONIC when the detector took the frame
   /// The frame's capture time, where it is of the daemon's own clock.
   std::optional<std::int64_t> captured_ns;
+  std::uint32_t map = 0;  ///< which map its image ids belong to: resets before it
+};
+
+/// A report on its way to the clients.
+struct TakenReport {
+  Report report;
+  ReportOrigin origin;
 };
 
 /// Carries reports from the detector to the event loop in a fixed number of slots allocated at the
@@ -39,7 +45,7 @@ class ReportQueue {
   ReportQueue(std::size_t slots, bool blocking);
 
   /// Hands over a copy of `report`. False if it was dropped, or the queue is closed.
-  bool give(const Report& report, std::int64_t taken_ns, std::optional<std::int64_t> captured_ns);
+  bool give(const Report& report, const ReportOrigin& origin);
 
   /// The oldest report given; empty if there is none right now.
   Lent take();

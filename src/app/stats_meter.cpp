@@ -25,6 +25,8 @@ StatsRecord StatsMeter::record(const Pipeline& pipeline, std::int64_t now_ns) {
   record.frames = now.frames;
   record.dropped = pipeline.dropped_frames();
   record.corrupt = pipeline.capture().corrupt;
+  record.restamped = pipeline.restamped_frames();
+  record.camera_losses = pipeline.capture().losses;
   record.errors = now.errors;
   record.loops = now.loops;
   record.candidates = now.candidates;

@@ -43,8 +43,7 @@ void append_printable(std::string& line, std::string_view text) {
 }
 
 void append_value(std::string& line, std::string_view value) {
-  const bool plain = !value.empty() && value.find_first_of(" \"=\\") == std::string_view::npos;
-  if (plain) return append_printable(line, value);
+  if (value.find_first_of(" \"=\\") == std::string_view::npos) return append_printable(line, value);
   line += '"';
   for (const char c : value) {
     if (c == '"' || c == '\\') line += '\\';
@@ -101,6 +100,7 @@ std::string line_of(std::string_view message, std::initializer_list<LogField> fi
   std::string line;
   append_printable(line, message);
   for (const auto& [name, value] : fields) {
+    if (value.empty()) continue;
     line += ' ';
     line += name;
     line += '=';
@@ -116,7 +116,8 @@ std::string entry_of(LogLevel level, std::string_view message,
   append_field(entry, "PRIORITY", std::to_string(static_cast<int>(level)));
   append_field(entry, "SYSLOG_IDENTIFIER", "loopd");
   if (!id.empty()) append_field(entry, "MESSAGE_ID", id);
-  for (const auto& [name, value] : fields) append_field(entry, "LOOPD_" + upper_case(name), value);
+  for (const auto& [name, value] : fields)
+    if (!value.empty()) append_field(entry, "LOOPD_" + upper_case(name), value);
   return entry;
 }
 

@@ -14,7 +14,7 @@ namespace loopd {
 /// The levels of syslog(3) that loopd uses; the numbers are what journald reads after `<`.
 enum class LogLevel : std::uint8_t { kError = 3, kWarning = 4, kNotice = 5, kInfo = 6, kDebug = 7 };
 
-/// A name and its value, printed as name=value after the message.
+/// A name and its value, printed as name=value after the message; without a value it is left out.
 using LogField = std::pair<std::string_view, std::string>;
 
 /// What kind of event an entry tells of: a 128-bit id as 32 hexadecimal digits, the MESSAGE_ID of

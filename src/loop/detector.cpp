@@ -358,8 +358,13 @@ class Detector::Impl {
 };
 
 Detector::Detector(const Config& config, LaneExecutor* lanes)
-    : impl_(std::make_unique<Impl>(config, lanes)) {}
+    : config_(config), lanes_(lanes), impl_(std::make_unique<Impl>(config, lanes)) {}
 Detector::~Detector() = default;
+
+void Detector::clear() {
+  impl_.reset();  // before the new one is made: never the memory of two maps
+  impl_ = std::make_unique<Impl>(config_, lanes_);
+}
 
 void Detector::process(const Frame& frame, Report& report) { impl_->process(frame, report); }
 void Detector::process(const Features& features, std::uint64_t sequence,

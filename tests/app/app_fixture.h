@@ -87,7 +87,7 @@ inline bool take_until(Pipeline& pipeline, State last,
     while (const auto taken = pipeline.take_report()) on_report(taken->report);
     for (const Notice& notice : notices) {
       on_notice(notice);
-      over = over || (notice.is_state && notice.record.state == last);
+      over = over || (notice.is_state() && notice.record.state == last);
     }
   }
   return true;

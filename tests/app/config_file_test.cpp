@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <map>
 #include <set>
 #include <sstream>
 
@@ -37,9 +38,15 @@ void change(const Parameter<DaemonConfig>& row, DaemonConfig& config) {
     **value = **value < row.max ? **value + 1 : **value - 1;
   if (auto* const* value = std::get_if<double*>(&ref)) **value = row.min + (row.max - row.min) / 3;
   if (auto* const* value = std::get_if<std::vector<int>*>(&ref)) **value = {0, 3, 1};
+  static const std::map<std::string_view, std::string> bound_texts = {
+      {"camera.source", "file"},
+      {"camera.name", "rear-2"},
+      {"camera.format", "NV12"},
+      {"camera.controls", "gain=2 gamma=\"3\""}};
   auto* const* text = std::get_if<std::string*>(&ref);
-  if (text != nullptr && row.key != "camera.source")
-    **text = row.key == "camera.name" ? "rear-2" : "a \"quoted\" \\ path/\xc3\xa9";
+  if (text == nullptr) return;
+  const auto bound = bound_texts.find(row.key);
+  **text = bound != bound_texts.end() ? bound->second : "a \"quoted\" \\ path/\xc3\xa9";
 }
 
 TEST(DaemonParameters, AreCompleteAndTheirDefaultsAreValid) {

@@ -20,7 +20,7 @@ TEST(Liveness, DetectionThatAdvancesIsLife) {
 
 TEST(Liveness, AHungDetectorIsNotEvenIfTheCameraIsLost) {
   Liveness liveness(kPatience, 0);
-  const Vitals hung{.frames_detected = 5, .work_pending = true, .camera_away = true};
+  const Vitals hung{.frames_detected = 5, .work_pending = true, .nothing_to_do = true};
   EXPECT_TRUE(liveness.alive(hung, 10));
   EXPECT_TRUE(liveness.alive(hung, 10 + kPatience));
   EXPECT_FALSE(liveness.alive(hung, 11 + kPatience));
@@ -28,7 +28,7 @@ TEST(Liveness, AHungDetectorIsNotEvenIfTheCameraIsLost) {
 
 TEST(Liveness, ALostCameraIsLifeForAsLongAsItTakes) {
   Liveness liveness(kPatience, 0);
-  const Vitals lost{.frames_detected = 5, .camera_away = true};
+  const Vitals lost{.frames_detected = 5, .nothing_to_do = true};
   for (const std::int64_t now : {1, 1'000, 1'000'000}) EXPECT_TRUE(liveness.alive(lost, now));
 }
 

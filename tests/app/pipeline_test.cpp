@@ -35,7 +35,7 @@ Seen run_until(const DaemonConfig& config, State last = State::kCameraEnd) {
     if (report.outcome == Outcome::kLoop) seen.loops.push_back(testing::loop_of(report));
   };
   const auto on_notice = [&seen](const Notice& notice) {
-    if (notice.is_state)
+    if (notice.is_state())
       seen.states.push_back(notice.record.state);
     else
       seen.lost_frames.push_back(notice.record.cause);
@@ -128,6 +128,80 @@ TEST(Pipeline, StopsWhereverItIs) {
     pipeline.value()->stop();
     pipeline.value()->stop();
   }
+}
+
+/// Waits for the pipeline's next report; null if none comes in a minute.
+ReportQueue::Lent next_report(Pipeline& pipeline) {
+  while (true) {
+    if (ReportQueue::Lent taken = pipeline.take_report()) return taken;
+    pollfd readable{pipeline.wake_fd(), POLLIN, 0};
+    if (poll(&readable, 1, 60'000) != 1) return nullptr;
+    pipeline.drain_wakeups();
+    while (pipeline.take_notice()) {
+    }
+  }
+}
+
+TEST(Pipeline, AResetStartsANewMapWithNewIds) {
+  const TempDir folder;
+  testing::write_laps(folder, kPlaces);
+  DaemonConfig config = testing::small_config(folder.string());
+  config.camera.loop = true;
+  auto pipeline = Pipeline::open(config);
+  ASSERT_TRUE(pipeline.ok());
+  ASSERT_TRUE(pipeline.value()->start().ok());
+  const ReportQueue::Lent first = next_report(*pipeline.value());
+  ASSERT_NE(first, nullptr);
+  EXPECT_EQ(first->origin.map, 0u);
+  pipeline.value()->reset_map();
+  std::uint32_t map = 0;
+  while (map == 0) {
+    const ReportQueue::Lent taken = next_report(*pipeline.value());
+    ASSERT_NE(taken, nullptr);
+    map = taken->origin.map;
+    if (map == 0) continue;
+    // The first report of the new map: within its first two laps or so, whatever went before.
+    EXPECT_EQ(map, 1u);
+    EXPECT_LT(taken->report.query, 3u * kPlaces);
+    EXPECT_EQ(pipeline.value()->map(), 1u);
+  }
+  pipeline.value()->stop();
+}
+
+TEST(Pipeline, APausedRecordingWaitsAndThenGivesTheSame) {
+  const TempDir folder;
+  testing::write_laps(folder, kPlaces);
+  DaemonConfig config = testing::small_config(folder.string());
+  const std::vector<LoopSeen> expected = testing::loops_of_detector_alone(config);
+  auto pipeline = Pipeline::open(config);
+  ASSERT_TRUE(pipeline.ok());
+  pipeline.value()->pause();
+  ASSERT_TRUE(pipeline.value()->start().ok());
+  pollfd readable{pipeline.value()->wake_fd(), POLLIN, 0};
+  ASSERT_EQ(poll(&readable, 1, 60'000), 1);  // the camera runs
+  EXPECT_EQ(pipeline.value()->totals().frames, 0u);
+  pipeline.value()->resume();
+  std::vector<LoopSeen> loops;
+  EXPECT_TRUE(testing::take_until(
+      *pipeline.value(), State::kCameraEnd,
+      [&loops](const Report& report) {
+        if (report.outcome == Outcome::kLoop) loops.push_back(testing::loop_of(report));
+      },
+      [](const Notice&) {}));
+  EXPECT_EQ(loops, expected);
+}
+
+TEST(Pipeline, AStopEndsAPause) {
+  const TempDir folder;
+  testing::write_laps(folder, 4);
+  auto pipeline = Pipeline::open(testing::small_config(folder.string()));
+  ASSERT_TRUE(pipeline.ok());
+  pipeline.value()->pause();
+  ASSERT_TRUE(pipeline.value()->start().ok());
+  pollfd readable{pipeline.value()->wake_fd(), POLLIN, 0};
+  EXPECT_EQ(poll(&readable, 1, 60'000), 1);
+  pipeline.value()->stop();
+  EXPECT_EQ(pipeline.value()->totals().frames, 0u);
 }
 
 TEST(Pipeline, StoppingOneThatNeverStartedIsNothing) {

@@ -46,6 +46,24 @@ TEST(DetectorSameResult, OnTwoRuns) {
   EXPECT_GE(loops, 15);
 }
 
+TEST(DetectorSameResult, AfterClearAsFromTheStart) {
+  const auto images = mixed_frames();
+  Detector detector(small_config());
+  const auto report = std::make_unique<Report>();
+  const auto lap_twice = [&] {
+    std::vector<std::string> reports;
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      detector.process(images[i].frame(i, static_cast<std::int64_t>(i) * kStepNs), *report);
+      detector.absorb(*report);
+      reports.push_back(text_of(*report));
+    }
+    return reports;
+  };
+  const auto first = lap_twice();
+  detector.clear();
+  EXPECT_EQ(lap_twice(), first);
+}
+
 TEST(DetectorSameResult, WithOneLaneOrTwo) {
   const auto images = mixed_frames();
   const auto lanes = TwoLanes::start({.name = "lines"});
