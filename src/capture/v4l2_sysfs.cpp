@@ -55,9 +55,9 @@ std::optional<long> number_after(std::string_view prefix, std::string_view text)
   return number;
 }
 
-// The USB device that `folder` belongs to, and the interface of it on the way up.
-void add_usb(SysfsDevice& device, fs::path folder) {
-  for (int depth = 0; depth < kMaxDepth && folder.has_relative_path(); ++depth) {
+// The USB device that `folder` belongs to, and the interface of it on the way up to `top`.
+void add_usb(SysfsDevice& device, fs::path folder, const fs::path& top) {
+  for (int depth = 0; depth < kMaxDepth && folder != top; ++depth) {
     if (device.interface_number.empty())
       device.interface_number = attribute(folder / "bInterfaceNumber");
     if (std::string vendor = attribute(folder / "idVendor"); !vendor.empty()) {
@@ -113,7 +113,7 @@ SysfsDevice sysfs_device(const V4l2Paths& paths, const std::string& name) {
   if (folder.empty()) return device;
   device.folder = folder;
   device.index = static_cast<int>(number_after("", attribute(node / "index")).value_or(0));
-  add_usb(device, folder);
+  add_usb(device, folder, resolved(paths.sys + "/devices"));
   return device;
 }
 

@@ -5,6 +5,7 @@
 
 #include <linux/dma-buf.h>
 
+#include <algorithm>
 #include <limits>
 #include <string>
 #include <vector>
@@ -24,6 +25,20 @@ using ::testing::HasSubstr;
 using testing::V4l2Test;
 
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
+
+// The time of the fake kernel, which a wait moves on.
+class KernelClock : public LiveClock {
+ public:
+  explicit KernelClock(testing::FakeV4l2& kernel) : kernel_(kernel) {}
+  std::int64_t now_ns() const override { return kernel_.time_ns; }
+  Interrupt::Ready wait(const Interrupt&, int, std::int64_t deadline_ns) override {
+    kernel_.time_ns = std::max(kernel_.time_ns, deadline_ns);
+    return Interrupt::Ready::kTimeout;
+  }
+
+ private:
+  testing::FakeV4l2& kernel_;
+};
 
 class V4l2DeviceTest : public V4l2Test {
  protected:
@@ -369,7 +384,9 @@ TEST_F(V4l2DeviceTest, AFailureOfAnyCallIsAnErrorOrNothingAndLeaksNothing) {
 TEST_F(V4l2DeviceTest, AThousandUnpluggingsLeakNothingAndTheCameraComesBack) {
   FramePool pool(2, 8 * 4);
   const auto driver_options = V4l2Options{.camera = path()};
-  auto camera_object = make_live_camera(make_v4l2_driver(driver_options, kernel_, paths_), pool);
+  KernelClock clock(kernel_);
+  auto camera_object =
+      make_live_camera(make_v4l2_driver(driver_options, kernel_, paths_), pool, clock);
   std::uint64_t last = 0;
   for (int i = 0; i < 1000; ++i) {
     camera().gone = false;
