@@ -62,6 +62,7 @@ class LibcameraDevice final : public CaptureDevice {
   std::optional<RawFrame> newest_frame();
   std::optional<std::size_t> better(std::optional<std::size_t> best, std::size_t next,
                                     std::uint64_t& passed_over);
+  bool late(std::size_t index) const;
   RawFrame read(std::size_t index);
   Grab nothing_came();
 
@@ -94,7 +95,8 @@ class LibcameraDevice final : public CaptureDevice {
   FrameLayout layout_;
   DeviceInfo info_;
   std::optional<std::size_t> held_;  ///< whose frame is out
-  std::size_t queued_ = 0;           ///< requests that libcamera has
+  std::optional<std::uint32_t> last_sequence_;
+  std::size_t queued_ = 0;  ///< requests that libcamera has
   std::optional<CameraError> lost_;
 };
 
