@@ -63,18 +63,20 @@ Status show(VideoOutput& output, const LumaImage& image, const Options& options,
 Status feed(const Options& options) {
   const auto files = list_files(options.folder, ".pgm");
   if (!files) return files.error();
-  const auto first = read_image(files.value().front());
-  if (!first) return first.error();
-  auto output = VideoOutput::open(options.device, options.format, first.value().width_px,
-                                  first.value().height_px);
+  std::vector<LumaImage> images;  // all in memory: reading would upset the rate
+  for (const auto& file : files.value()) {
+    auto image = read_image(file);
+    if (!image) return image.error();
+    images.push_back(std::move(image).value());
+  }
+  auto output = VideoOutput::open(options.device, options.format, images.front().width_px,
+                                  images.front().height_px);
   if (!output) return output.error();
   std::int64_t next_ns = monotonic_now_ns();
   for (int lap = 0; lap < options.laps; ++lap) {
-    for (const auto& file : files.value()) {
-      const auto image = read_image(file);
-      if (!image) return image.error();
-      std::cout << monotonic_now_ns() << " " << file.filename().string() << std::endl;
-      const Status shown = show(output.value(), image.value(), options, next_ns);
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      std::cout << monotonic_now_ns() << " " << files.value()[i].filename().string() << std::endl;
+      const Status shown = show(output.value(), images[i], options, next_ns);
       if (!shown) return shown;
     }
   }

@@ -50,7 +50,7 @@ def connect_vivid_loop(camera, output):
     """640x480 on both ends, and the one led to the other."""
     for device in (output, camera):
         v4l2(device, "--set-dv-bt-timings", "index=0")
-    control(camera, loop_video=1)
+    control(camera, loop_video=1, osd_text_mode=2)  # 2: nothing is written into the picture
 
 
 def unbind_vivid():
