@@ -37,6 +37,6 @@ std::unique_ptr<CaptureDriver> make_libcamera_driver(const LibcameraOptions& opt
   return std::make_unique<AbsentDriver>(options.camera);
 }
 
-Result<std::vector<LibcameraListing>> list_libcamera_cameras() { return Error{kAbsent, ENOTSUP}; }
+Result<std::vector<CameraListing>> list_libcamera_cameras() { return Error{kAbsent, ENOTSUP}; }
 
 }  // namespace loopd

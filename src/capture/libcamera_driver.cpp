@@ -86,30 +86,39 @@ class LibcameraDriver final : public CaptureDriver {
   DevWatch watch_;
 };
 
-std::string sizes_text(const std::vector<FrameSize>& sizes) {
-  std::string text;
-  for (const FrameSize& size : sizes)
-    text += " " + std::to_string(size.width_px) + "x" + std::to_string(size.height_px);
-  return text;
+V4l2Mode mode_of(const FormatOffer& offer) {
+  V4l2Mode mode;
+  mode.format = pixel_format_from_drm(offer.code, offer.modifier);
+  mode.fourcc = offer.code;
+  if (mode.format) {
+    const std::string_view name = pixel_format_name(*mode.format);
+    mode.fourcc = fourcc(name[0], name[1], name[2], name[3]);
+  }
+  for (const FrameSize& size : offer.sizes)
+    mode.sizes.push_back({size.width_px, size.height_px, {}});
+  if (offer.sizes.empty() && offer.step.width_px > 0 && offer.step.height_px > 0)
+    mode.range =
+        V4l2SizeRange{offer.smallest.width_px,  offer.largest.width_px,  offer.step.width_px,
+                      offer.smallest.height_px, offer.largest.height_px, offer.step.height_px};
+  return mode;
 }
 
-LibcameraListing listing_of(const LibcameraManager& manager, libcamera::Camera& camera) {
-  const CameraName name = camera_name(camera);
-  LibcameraListing listing{name.id, name.model, {}, {}, {}, {}};
-  for (const CameraNode& node : manager.nodes(camera)) listing.nodes.push_back("/dev/" + node.name);
+CameraListing listing_of(const LibcameraManager& manager, libcamera::Camera& camera) {
+  const std::vector<CameraNode> nodes = manager.nodes(camera);
+  CameraListing listing;
+  listing.node = camera.id();
+  listing.id = stable_id(camera, nodes);
+  listing.name = camera_name(camera).model;
+  listing.driver = "libcamera";
+  for (const CameraNode& node : nodes)
+    listing.bus += (listing.bus.empty() ? "/dev/" : " /dev/") + node.name;
   const auto config = camera.generateConfiguration({libcamera::StreamRole::Viewfinder});
   if (!config || config->empty()) {
-    listing.problem = "libcamera offers no stream of it for viewing";
+    listing.problem = "libcamera offers no stream of it for viewing; use another camera";
     return listing;
   }
-  for (const FormatOffer& offer : format_offers(config->at(0).formats())) {
-    const auto format = pixel_format_from_drm(offer.code, offer.modifier);
-    if (format)
-      listing.formats.push_back(std::string(pixel_format_name(*format)) + sizes_text(offer.sizes));
-    else
-      listing.other_formats.push_back(
-          libcamera::PixelFormat(offer.code, offer.modifier).toString());
-  }
+  for (const FormatOffer& offer : format_offers(config->at(0).formats()))
+    listing.modes.push_back(mode_of(offer));
   return listing;
 }
 
@@ -123,10 +132,10 @@ std::unique_ptr<CaptureDriver> make_libcamera_driver(const LibcameraOptions& opt
   return std::make_unique<LibcameraDriver>(options);
 }
 
-Result<std::vector<LibcameraListing>> list_libcamera_cameras() {
+Result<std::vector<CameraListing>> list_libcamera_cameras() {
   auto manager = LibcameraManager::start();
   if (!manager) return manager.error();
-  std::vector<LibcameraListing> listings;
+  std::vector<CameraListing> listings;
   for (const auto& camera : manager.value()->cameras())
     listings.push_back(listing_of(*manager.value(), *camera));
   return listings;

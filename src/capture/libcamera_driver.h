@@ -7,6 +7,7 @@
 
 #include "base/result.h"
 #include "capture/capture_device.h"
+#include "capture/v4l2_list.h"
 
 namespace loopd {
 
@@ -46,19 +47,11 @@ LibcameraBuild libcamera_build();
 /// In a build without libcamera every open() is the error "this build has no libcamera; ...".
 std::unique_ptr<CaptureDriver> make_libcamera_driver(const LibcameraOptions& options);
 
-/// A camera as libcamera lists it.
-struct LibcameraListing {
-  std::string id;                    ///< libcamera's
-  std::string model;                 ///< for people; may be empty
-  std::vector<std::string> nodes;    ///< "/dev/video0"; empty if not known
-  std::vector<std::string> formats;  ///< "YUYV 640x480 1280x720", one a pixel format we can read
-  std::vector<std::string> other_formats;  ///< libcamera's names of those we cannot
-  std::string problem;  ///< why its formats are not known ("in use by another process"); or empty
-};
-
-/// The cameras libcamera sees now. Blocks as long as it takes to look (some 100 ms).
-/// Errors: this build has no libcamera, it does not start, or a driver of this process has a camera
-/// open.
-Result<std::vector<LibcameraListing>> list_libcamera_cameras();
+/// The cameras libcamera sees now, told as V4L2's are: `node` is libcamera's id (for camera.path),
+/// `name` the model, `driver` "libcamera", `bus` the nodes in /dev behind it, as far as known.
+/// Modes that can be read have the code of their PixelFormat, the others DRM's; rates are not
+/// known. Blocks as long as it takes to look (some 100 ms). Errors: this build has no libcamera, it
+/// does not start, or a driver of this process has a camera open.
+Result<std::vector<CameraListing>> list_libcamera_cameras();
 
 }  // namespace loopd

@@ -38,7 +38,10 @@ TEST(LibcameraDriver, ListsWhatThereIsOrSaysWhyNot) {
   const auto listings = list_libcamera_cameras();
   ASSERT_EQ(listings.ok(), libcamera_build().present);
   if (!listings.ok()) return;
-  for (const LibcameraListing& listing : listings.value()) EXPECT_FALSE(listing.id.empty());
+  for (const CameraListing& listing : listings.value()) {
+    EXPECT_FALSE(listing.id.empty());
+    EXPECT_EQ(listing.driver, "libcamera");
+  }
 }
 
 TEST(LibcameraDriver, TellsOfItsBuild) {
