@@ -1,7 +1,6 @@
 #include "capture/file_camera.h"
 
 #include <sys/stat.h>
-#include <sys/sysmacros.h>
 
 #include <algorithm>
 #include <array>
@@ -308,32 +307,18 @@ Result<std::unique_ptr<FrameSource>> open_file(const SourceOptions& source,
   return open_video_source(source, video_decoder, interrupt);
 }
 
-// No other device may be opened to see what it is: that alone can have consequences.
-bool is_video_device(const struct stat& status) {
-  constexpr unsigned kVideo4Linux = 81;  // its major number
-  return S_ISCHR(status.st_mode) && major(status.st_rdev) == kVideo4Linux;
-}
-
-Result<std::unique_ptr<FrameSource>> open_device(const FileCameraOptions& options,
-                                                 const FramePool& pool,
-                                                 const Interrupt& interrupt) {
-  if (options.fps > 0 || options.start > 0)
-    return Error{"cannot open the device " + options.path +
-                     ": it sets its own pace; camera.fps and camera.start must be 0",
-                 EINVAL};
-  const SourceOptions source{.path = options.path, .max_pixels = pool.bytes_each(), .live = true};
-  return open_video_source(source, options.video_decoder, interrupt);
-}
-
 Result<std::unique_ptr<FrameSource>> open_source(const FileCameraOptions& options,
                                                  const FramePool& pool,
                                                  const Interrupt& interrupt) {
   struct stat status {};
   if (::stat(options.path.c_str(), &status) != 0)
     return errno_error("cannot open " + options.path, errno);
-  if (is_video_device(status)) return open_device(options, pool, interrupt);
-  const SourceOptions source{options.path, options.loop, options.nominal_fps, pool.bytes_each(),
-                             false};
+  // No device is opened to see what it is: that alone can have consequences.
+  if (S_ISCHR(status.st_mode))
+    return Error{"cannot open " + options.path +
+                     ": it is a device, no recording; for a camera set camera.source = \"v4l2\"",
+                 ENOTSUP};
+  const SourceOptions source{options.path, options.loop, options.nominal_fps, pool.bytes_each()};
   if (S_ISDIR(status.st_mode)) return open_folder_source(source);
   if (!S_ISREG(status.st_mode))
     return Error{"cannot open " + options.path + ": it is neither a folder nor a file", ENOTSUP};

@@ -12,7 +12,7 @@ namespace loopd {
 /// How a folder of images, a recording or a video file stands in for a camera.
 struct FileCameraOptions {
   /// A folder of images; a dataset folder (then its `images/` is used); one image; a raw recording
-  /// (recording_format.h); or a video; or a V4L2 device, see below.
+  /// (recording_format.h); or a video.
   /// In a folder every *.jpg, *.jpeg, *.png, *.pgm, *.ppm and *.pnm (any case) is a frame, sorted
   /// by name byte by byte; other names are ignored. What is in a file is decided by its content.
   std::string path = {};
@@ -62,10 +62,6 @@ struct FileCameraOptions {
 /// A video is decoded by a child process (`loopd-video`), so that the daemon links no video
 /// library (140 and more shared objects) and a hostile file can only kill the decoder: that ends
 /// the stream with a kStreamError. The child is killed and reaped by the camera's destructor.
-///
-/// A V4L2 device ("/dev/video0") is read by the same child, for trials by hand: only with fps = 0,
-/// at the pace of the slower of device and reader, a few frames late; Frame::time_ns is
-/// CLOCK_MONOTONIC when the frame was read, and a device that goes away ends the stream.
 ///
 /// With fps = 0 the durations of stalls and of unplugging take no time: a stall appears in the
 /// times only, and a camera unplugged for D answers D x 30 (one for each frame at 30 fps) calls

@@ -15,7 +15,6 @@ struct SourceOptions {
   bool loop = false;
   double nominal_fps = 0;      ///< for times where no other is known; 0 = none
   std::size_t max_pixels = 0;  ///< of one frame
-  bool live = false;           ///< a device: frames have the time at which they were read
 };
 
 /// Paths of the images that open_folder_source(path) delivers: the one at index i is frame i of a

@@ -160,7 +160,6 @@ class VideoSource : public FrameSource {
   }
 
   std::optional<std::int64_t> time_ns(std::uint64_t sequence) const override {
-    if (options_.live) return read_ns_;
     const double fps = options_.nominal_fps > 0 ? options_.nominal_fps : video_.header.fps;
     if (fps <= 0) return std::nullopt;
     return std::llround(static_cast<double>(sequence) * 1e9 / fps);
@@ -170,8 +169,8 @@ class VideoSource : public FrameSource {
 
   std::string describe() const override {
     const Y4mHeader& header = video_.header;
-    return std::string(options_.live ? "device of " : "video of ") +
-           std::to_string(header.size.width_px) + "x" + std::to_string(header.size.height_px) +
+    return "video of " + std::to_string(header.size.width_px) + "x" +
+           std::to_string(header.size.height_px) +
            (header.fps > 0 ? " at " + rate_text(header.fps) + " fps, " : ", ") + options_.path;
   }
 
@@ -186,7 +185,6 @@ class VideoSource : public FrameSource {
     if (got != Got::kAll) return got;
     if (std::memcmp(line.data(), kFrameLine.data(), line.size()) != 0) return Got::kCut;
     const Got body = video_.stream.read(pixels_);
-    read_ns_ = monotonic_now_ns();
     return body == Got::kEnd ? Got::kCut : body;
   }
 
@@ -213,9 +211,8 @@ class VideoSource : public FrameSource {
   CameraError failure(CameraFault fault, const std::string& cause, std::uint64_t sequence) {
     const std::string said = video_.stream.complaint();
     return {fault,
-            (options_.live ? "cannot go on with the device " : "cannot go on with the video ") +
-                options_.path + " after frame " + std::to_string(position_) + ": " + cause +
-                (said.empty() ? "" : " (" + said + ")"),
+            "cannot go on with the video " + options_.path + " after frame " +
+                std::to_string(position_) + ": " + cause + (said.empty() ? "" : " (" + said + ")"),
             0, true, sequence};
   }
 
@@ -226,14 +223,11 @@ class VideoSource : public FrameSource {
   std::vector<std::uint8_t> pixels_;  ///< the newest frame read
   std::uint64_t position_ = 0;        ///< frames read, over all laps
   std::uint64_t lap_frames_ = 0;      ///< frames read in this lap
-  std::int64_t read_ns_ = 0;          ///< CLOCK_MONOTONIC when `pixels_` was read
   bool ended_ = false;
 };
 
 Error cannot_decode(const SourceOptions& options, const std::string& cause) {
-  return {(options.live ? "cannot read the device " : "cannot decode the video ") + options.path +
-              ": " + cause,
-          0};
+  return {"cannot decode the video " + options.path + ": " + cause, 0};
 }
 
 Result<OpenVideo> VideoSource::open(const SourceOptions& options,

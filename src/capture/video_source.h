@@ -27,7 +27,7 @@ Result<Y4mHeader> parse_y4m_header(std::string_view line);
 /// beside this executable, in the installed libexec folder, and in PATH.
 std::vector<std::string> video_decoder_candidates(const std::string& chosen);
 
-/// Opens the video (or live device) options.path by a decoder process. `interrupt` ends waits for
+/// Opens the video options.path by a decoder process. `interrupt` ends waits for
 /// the decoder and must outlive the source. Errors: no decoder found, or it cannot decode the file
 /// (with its own words), or frames larger than options.max_pixels.
 Result<std::unique_ptr<FrameSource>> open_video_source(const SourceOptions& options,

@@ -1,5 +1,4 @@
-// loopd-video FILE: writes the frames of a video, or of a V4L2 device, to standard output as
-// one-plane YUV4MPEG2
+// loopd-video FILE: writes the frames of a video to standard output as one-plane YUV4MPEG2
 // ("YUV4MPEG2 W640 H480 F30000:1001 Ip A1:1 Cmono", then "FRAME" and width x height bytes each).
 //
 // A process of its own so that the daemon links no video library (140 and more shared objects)
@@ -86,27 +85,19 @@ bool to_luma(const cv::Mat& frame, std::vector<std::uint8_t>& luma) {
   return true;
 }
 
-bool is_kind(const char* path, mode_t kind) {
+bool is_file(const char* path) {
   struct stat status {};
-  return ::stat(path, &status) == 0 && (status.st_mode & S_IFMT) == kind;
+  return ::stat(path, &status) == 0 && S_ISREG(status.st_mode);
 }
 
 bool open_video(cv::VideoCapture& video, const std::string& path) {
-  if (is_kind(path.c_str(), S_IFCHR)) return video.open(path, cv::CAP_V4L2);
   // Only decoders of files: no picture series, no pipeline descriptions, no network.
   return video.open(path, cv::CAP_FFMPEG) || video.open(path, cv::CAP_OPENCV_MJPEG);
 }
 
-const char* why_not_open(const char* path) {
-  if (!is_kind(path, S_IFCHR)) return "no known video format";
-  if (::access(path, R_OK | W_OK) != 0)
-    return "permission denied; the user must be in the group that owns it, mostly \"video\"";
-  return "it gives no pictures, or another program uses it";
-}
-
 int decode(const std::string& path, int stderr_fd) {
   cv::VideoCapture video;
-  if (!open_video(video, path)) return fail(stderr_fd, why_not_open(path.c_str()));
+  if (!open_video(video, path)) return fail(stderr_fd, "no known video format");
   const double fps = video.get(cv::CAP_PROP_FPS);
   cv::Mat frame;
   cv::Size size;
@@ -137,8 +128,7 @@ void limit_memory() {
 
 int main(int argc, char** argv) {
   if (argc != 2) return fail(STDERR_FILENO, "usage: loopd-video FILE");
-  if (!is_kind(argv[1], S_IFREG) && !is_kind(argv[1], S_IFCHR))
-    return fail(STDERR_FILENO, "it is neither a file nor a device");
+  if (!is_file(argv[1])) return fail(STDERR_FILENO, "it is no file");
   limit_memory();
   // A playlist inside a file must not reach for the network.
   ::setenv("OPENCV_FFMPEG_CAPTURE_OPTIONS", "protocol_whitelist;file", 1);
