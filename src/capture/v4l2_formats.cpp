@@ -123,14 +123,15 @@ std::string fourcc_text(std::uint32_t fourcc) {
     const auto letter = static_cast<char>(fourcc >> shift & 0x7f);
     text += letter >= ' ' && letter <= '~' ? letter : '.';
   }
-  return text;
+  constexpr std::uint32_t kBigEndian = 1u << 31;
+  return (fourcc & kBigEndian) != 0 ? text + "-BE" : text;
 }
 
 double V4l2Size::fastest() const {
   return fps.empty() ? 0 : *std::max_element(fps.begin(), fps.end());
 }
 
-std::vector<V4l2Mode> list_modes(const V4l2Node& node, std::uint32_t type) {
+std::vector<V4l2Mode> list_modes(const V4l2Node& node, std::uint32_t type, ListSizes sizes) {
   std::vector<V4l2Mode> modes;
   for (std::uint32_t i = 0; i < kMaxFormats; ++i) {
     v4l2_fmtdesc description{};
@@ -144,7 +145,7 @@ std::vector<V4l2Mode> list_modes(const V4l2Node& node, std::uint32_t type) {
       return other.fourcc == mode.fourcc;
     });
     if (known) continue;
-    list_sizes(node, mode);
+    if (mode.format || sizes == ListSizes::kOfAll) list_sizes(node, mode);
     modes.push_back(std::move(mode));
   }
   return modes;

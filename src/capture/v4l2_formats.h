@@ -14,7 +14,7 @@ namespace loopd {
 /// or in how the planes are divided, share a PixelFormat.
 std::optional<PixelFormat> pixel_format_from_fourcc(std::uint32_t fourcc);
 
-/// "YUYV"; characters that cannot be printed as '.'.
+/// "YUYV", "Y16 -BE"; characters that cannot be printed as '.'.
 std::string fourcc_text(std::uint32_t fourcc);
 
 /// A size that a camera offers in some format.
@@ -40,9 +40,11 @@ struct V4l2Mode {
   std::optional<V4l2SizeRange> range;
 };
 
-/// All formats of a node, with sizes and rates. `type` is the buffer type of its capture queue.
-/// What a driver gives without end or sense is cut off.
-std::vector<V4l2Mode> list_modes(const V4l2Node& node, std::uint32_t type);
+/// All formats of a node, with sizes and rates: of all, or of those that are read here, which is
+/// much less to ask of some drivers. `type` is the buffer type of the capture queue. What a driver
+/// gives without end or sense is cut off.
+enum class ListSizes : std::uint8_t { kOfAll, kOfReadable };
+std::vector<V4l2Mode> list_modes(const V4l2Node& node, std::uint32_t type, ListSizes sizes);
 
 /// The rates at one size; empty if the driver does not tell.
 std::vector<double> list_rates(const V4l2Node& node, std::uint32_t fourcc, int width_px,

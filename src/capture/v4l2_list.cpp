@@ -49,7 +49,7 @@ std::optional<CameraListing> list_node(V4l2Io& io, const V4l2Paths& paths,
   listing.driver = capability.driver;
   listing.bus = capability.bus_info;
   listing.id = stable_id(device, capability.bus_info, capability.card);
-  listing.modes = list_modes(node, capability.type);
+  listing.modes = list_modes(node, capability.type, ListSizes::kOfAll);
   listing.problem = busy_problem(context, capability.type);
   return listing;
 }

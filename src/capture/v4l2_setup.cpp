@@ -293,7 +293,7 @@ std::optional<CameraError> negotiate(const V4l2Context& context, std::uint32_t t
     wish.width_px = static_cast<int>(std::clamp(now.width_px, 1u, kMaxSide_px));
   if (wish.height_px < 1)
     wish.height_px = static_cast<int>(std::clamp(now.height_px, 1u, kMaxSide_px));
-  std::vector<V4l2Mode> modes = list_modes(context.node, type);
+  std::vector<V4l2Mode> modes = list_modes(context.node, type, ListSizes::kOfReadable);
   if (modes.empty()) modes.push_back({now.fourcc, pixel_format_from_fourcc(now.fourcc), {}, {}});
   if (auto failure = set_format(context, type, modes, wish, stream)) return failure;
   stream.fps = set_rate(context.node, type, wish.fps);
