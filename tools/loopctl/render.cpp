@@ -1,10 +1,8 @@
-#include "render.h"
+#include "loopctl/render.h"
 
 #include <time.h>
 
-#include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <cstdio>
 
@@ -12,44 +10,7 @@ namespace loopd::loopctl {
 
 namespace {
 
-/// The member `key` of an object, else null.
-const Json& member(const Json& json, const char* key) {
-  static const Json kNull;
-  if (!json.is_object()) return kNull;
-  const auto it = json.find(key);
-  return it == json.end() ? kNull : *it;
-}
-
-/// Text that cannot drive a terminal.
-std::string printable(std::string text) {
-  const auto is_control = [](unsigned char c) { return c < 0x20 || c == 0x7f; };
-  std::replace_if(text.begin(), text.end(), is_control, '?');
-  return text;
-}
-
-/// A value as people write it; "?" if it is not there.
-std::string text_of(const Json& value) {
-  if (value.is_null()) return "?";
-  if (value.is_string()) return printable(value.get<std::string>());
-  return value.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-std::string text_of(const Json& json, const char* key) { return text_of(member(json, key)); }
-
-std::string decimal(double value, int digits) {
-  std::array<char, 64> text;
-  std::snprintf(text.data(), text.size(), "%.*f", digits, value);
-  return text.data();
-}
-
-/// A number scaled, with `digits` decimals; "?" if it is not there.
-std::string scaled(const Json& value, double scale, int digits) {
-  return value.is_number() ? decimal(value.get<double>() * scale, digits) : "?";
-}
-
 std::string ms(const Json& us) { return scaled(us, 1e-3, 1); }
-
-std::string mib(const Json& bytes) { return scaled(bytes, 1.0 / (1024 * 1024), 1) + " MiB"; }
 
 std::string duration(const Json& ns) {
   if (!ns.is_number()) return "?";
@@ -94,6 +55,7 @@ std::string candidate_line(const Json& record) {
 
 std::string state_line(const Json& record) {
   std::string line = "STATE " + text_of(record, "state");
+  if (member(record, "fault").is_string()) line += " (" + text_of(record, "fault") + ")";
   if (member(record, "cause").is_string()) line += ": " + text_of(record, "cause");
   if (member(record, "remedy").is_string()) line += " [" + text_of(record, "remedy") + "]";
   return line;
@@ -105,6 +67,18 @@ std::string frames_text(const Json& stats) {
          (rate.is_number() ? " (" + scaled(rate, 1, 1) + "/s)" : "") + ", " +
          text_of(stats, "dropped") + " dropped, " + text_of(stats, "corrupt") + " corrupt, " +
          text_of(stats, "errors") + " failed";
+}
+
+/// What there is to say of the camera; empty if all is well.
+std::string camera_text(const Json& stats) {
+  const double losses = number_of(stats, "camera_losses");
+  const double restamped = number_of(stats, "restamped");
+  std::string text;
+  if (losses > 0) text = "lost " + decimal(losses, 0) + (losses == 1 ? " time" : " times");
+  if (restamped > 0) {
+    text += (text.empty() ? "" : ", ") + decimal(restamped, 0) + " frames with a replaced time";
+  }
+  return text;
 }
 
 std::string map_text(const Json& stats) {
@@ -130,8 +104,14 @@ std::string stats_line(const Json& record) {
 }
 
 std::string gap_line(const Json& record) {
-  return "GAP " + text_of(record, "count") + " records missed (seq " + text_of(record, "first") +
-         " to " + text_of(record, "last") + "): this reader was too slow";
+  const Json& count = member(record, "count");
+  const Json& epoch = member(record, "of_epoch");
+  std::string line = "GAP " + (count.is_null() ? "some" : text_of(count)) + " records missed";
+  if (!member(record, "first").is_null()) {
+    line += " (seq " + text_of(record, "first") + " to " + text_of(record, "last") + ")";
+  }
+  if (!epoch.is_null()) return line + " of epoch " + text_of(epoch);
+  return line + ": this reader was too slow";
 }
 
 std::string hello_line(const Json& record) {
@@ -164,6 +144,7 @@ std::string status_block(const Json& hello, const Json& state, const Json& stats
                          const std::string& socket_path) {
   const std::string now = state.is_null() ? "no state known yet" : text_of(state, "state");
   std::string text = "camera " + text_of(hello, "camera") + ": " + now + "\n";
+  if (member(state, "fault").is_string()) text += row("fault", text_of(state, "fault"));
   if (member(state, "cause").is_string()) text += row("cause", text_of(state, "cause"));
   if (member(state, "remedy").is_string()) text += row("remedy", text_of(state, "remedy"));
   text +=
@@ -172,6 +153,7 @@ std::string status_block(const Json& hello, const Json& state, const Json& stats
   if (stats.is_null()) return text + row("frames", "no counters known yet");
   text += row("up", duration(member(stats, "uptime_ns")));
   text += row("frames", frames_text(stats));
+  if (const std::string camera = camera_text(stats); !camera.empty()) text += row("camera", camera);
   text += row("loops", text_of(stats, "loops") + " accepted, " + text_of(stats, "candidates") +
                            " candidates rejected");
   text += row("map", map_text(stats));

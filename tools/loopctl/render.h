@@ -2,11 +2,9 @@
 
 #include <string>
 
-#include "nlohmann/json.hpp"
+#include "loopctl/json_view.h"
 
 namespace loopd::loopctl {
-
-using Json = nlohmann::ordered_json;
 
 /// One record as a line for people, without the time and the newline; empty for records that
 /// people need not see. Unknown classes and fields of unexpected type are shown, never an error.

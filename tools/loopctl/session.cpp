@@ -1,15 +1,11 @@
-#include "session.h"
-
-#include <poll.h>
-#include <sys/signalfd.h>
+#include "loopctl/session.h"
 
 #include <algorithm>
-#include <csignal>
 #include <iostream>
 
-#include "base/unique_fd.h"
 #include "events/client.h"
-#include "render.h"
+#include "loopctl/render.h"
+#include "loopctl/stop_signals.h"
 
 namespace loopd::loopctl {
 
@@ -23,38 +19,15 @@ constexpr milliseconds kForever = std::chrono::hours(24 * 365);
 /// Between attempts to connect: a restarted daemon is found again well within a second.
 constexpr milliseconds kRetry{250};
 
-/// SIGINT and SIGTERM as a descriptor, so that waiting for records and for them is one wait.
-UniqueFd stop_signals() {
-  sigset_t set;
-  sigemptyset(&set);
-  sigaddset(&set, SIGINT);
-  sigaddset(&set, SIGTERM);
-  sigprocmask(SIG_BLOCK, &set, nullptr);
-  return UniqueFd(signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK));
-}
-
-/// Whether a stop signal has come, waiting for one at most `wait`.
-bool stop_requested(const UniqueFd& signals, milliseconds wait) {
-  pollfd fd{signals.get(), POLLIN, 0};
-  return poll(&fd, 1, static_cast<int>(wait.count())) > 0;
-}
-
 void complain(const std::string& message) { std::cerr << "loopctl: " << message << std::endl; }
 
-Json parse(const std::string& text) { return Json::parse(text, nullptr, false); }
-
-std::string class_of(const Json& record) {
-  if (!record.is_object() || !record.contains("class") || !record["class"].is_string()) return {};
-  return record["class"].get<std::string>();
-}
+std::string class_of(const Json& record) { return text_of(record, "class"); }
 
 /// One run of `loopctl watch`, over as many connections as it takes.
 class Watch {
  public:
   explicit Watch(const WatchOptions& options)
-      : options_(options),
-        signals_(stop_signals()),
-        deadline_(Clock::now() + options.timeout.value_or(kForever)) {}
+      : options_(options), deadline_(Clock::now() + options.timeout.value_or(kForever)) {}
 
   int run() {
     while (!done_) {
@@ -63,7 +36,7 @@ class Watch {
       if (ended_in_order_ && !options_.retry) return finish();
       report_end(end);
       if (!options_.retry) return 1;
-      if (stop_requested(signals_, std::min(kRetry, left()))) return 0;
+      if (signals_.take(std::min(kRetry, left()))) return 0;
       done_ = left() == milliseconds(0);
     }
     return finish();
@@ -83,12 +56,12 @@ class Watch {
     last_complaint_.clear();
     ended_in_order_ = false;
     while (!done_) {
-      Result<std::optional<std::string>> text = client->next(left(), signals_.get());
+      Result<std::optional<std::string>> text = client->next(left(), signals_.fd());
       if (!text) return text.error();
       if (text.value()) {
         show(*text.value());
       } else {
-        stopped_ = stop_requested(signals_, milliseconds(0));
+        stopped_ = signals_.take();
         done_ = stopped_ || left() == milliseconds(0);
       }
     }
@@ -96,7 +69,7 @@ class Watch {
   }
 
   void show(const std::string& text) {
-    const Json record = parse(text);
+    const Json record = parse_json(text);
     const std::string line = options_.json || record.is_discarded() ? text : record_line(record);
     if (options_.json) {
       std::cout << line << std::endl;
@@ -110,7 +83,7 @@ class Watch {
   void account(const Json& record) {
     const std::string record_class = class_of(record);
     if (record_class == "state") {
-      ended_in_order_ = record.value("state", Json()) == state_name(State::kShuttingDown);
+      ended_in_order_ = text_of(record, "state") == state_name(State::kShuttingDown);
     }
     if (record_class != "loop") return;
     ++loops_;
@@ -132,7 +105,7 @@ class Watch {
   }
 
   const WatchOptions& options_;
-  const UniqueFd signals_;
+  const StopSignals signals_;
   const Clock::time_point deadline_;
   bool done_ = false;
   bool stopped_ = false;         ///< by a signal: what was asked for is what came
@@ -141,32 +114,28 @@ class Watch {
   std::string last_complaint_;
 };
 
-struct Snapshot {
-  Json hello, state, stats;
-};
+}  // namespace
 
-/// Asks for the current state and counters, then for nothing: the second answer tells that all
-/// there was has come.
-Result<Snapshot> ask_status(const StatusOptions& options) {
-  Result<EventClient> client = EventClient::connect(options.socket_path);
+Result<Snapshot> ask_status(const std::string& socket_path, milliseconds timeout) {
+  Result<EventClient> client = EventClient::connect(socket_path);
   if (!client) return client.error();
+  // Nothing is asked for last: the answer to that tells that all there was has come.
   const WatchRequest newest{{RecordClass::kState, RecordClass::kStats}, false, std::nullopt};
   const WatchRequest nothing{{}, false, std::nullopt};
   for (const WatchRequest& request : {newest, nothing}) {
     if (Status sent = client->watch(request); !sent) return sent.error();
   }
   Snapshot snapshot;
-  const auto deadline = Clock::now() + options.timeout;
+  const auto deadline = Clock::now() + timeout;
   for (int answers = 0; answers < 2;) {
     const auto left = std::chrono::ceil<milliseconds>(deadline - Clock::now());
     Result<std::optional<std::string>> text = client->next(std::max(left, milliseconds(0)));
     if (!text) return text.error();
     if (!text.value()) {
-      return Error{
-          "loopd at \"" + options.socket_path + "\" accepts connections but does not answer",
-          ETIMEDOUT};
+      return Error{"loopd at \"" + socket_path + "\" accepts connections but does not answer",
+                   ETIMEDOUT};
     }
-    Json record = parse(*text.value());
+    Json record = parse_json(*text.value());
     const std::string record_class = class_of(record);
     if (record_class == "error") return Error{"loopd says: " + record_line(record), 0};
     if (record_class == "watch") ++answers;
@@ -177,12 +146,10 @@ Result<Snapshot> ask_status(const StatusOptions& options) {
   return snapshot;
 }
 
-}  // namespace
-
 int watch(const WatchOptions& options) { return Watch(options).run(); }
 
 int status(const StatusOptions& options) {
-  const Result<Snapshot> snapshot = ask_status(options);
+  const Result<Snapshot> snapshot = ask_status(options.socket_path, options.timeout);
   if (!snapshot) {
     complain(snapshot.error().message);
     return 1;
@@ -190,7 +157,7 @@ int status(const StatusOptions& options) {
   const auto& [hello, state, stats] = snapshot.value();
   if (options.json) {
     const Json json{{"hello", hello}, {"state", state}, {"stats", stats}};
-    std::cout << json.dump(-1, ' ', false, Json::error_handler_t::replace) << std::endl;
+    std::cout << dump(json) << std::endl;
   } else {
     std::cout << status_block(hello, state, stats, options.socket_path) << std::flush;
   }

@@ -5,7 +5,9 @@
 #include <optional>
 #include <string>
 
+#include "base/result.h"
 #include "events/records.h"
+#include "loopctl/json_view.h"
 
 namespace loopd::loopctl {
 
@@ -23,6 +25,14 @@ struct StatusOptions {
   bool json = false;
   std::chrono::milliseconds timeout{2000};
 };
+
+/// What a daemon tells at once: its greeting, and its newest state and counters (null if it has
+/// none yet).
+struct Snapshot {
+  Json hello, state, stats;
+};
+/// Errors: no daemon, no answer in time, or the daemon says why not.
+Result<Snapshot> ask_status(const std::string& socket_path, std::chrono::milliseconds timeout);
 
 /// Both print to stdout, complaints to stderr, and return the exit status: 0 as asked, 1 not.
 int watch(const WatchOptions& options);

@@ -1,0 +1,183 @@
+#include "loopctl/cameras.h"
+
+#include <algorithm>
+
+#include "app/parameter_text.h"
+
+namespace loopd::loopctl {
+
+namespace {
+
+constexpr std::string_view kNone =
+    "no camera found\n"
+    "  USB: is it in the list of lsusb? If not, try another port and cable; if so, see what the\n"
+    "       kernel says of it: dmesg | grep -i -e uvc -e video\n"
+    "  CSI: is it enabled in the firmware's settings, and this build one with libcamera?\n"
+    "  In a container or virtual machine: is the device handed in, with its /dev node?\n";
+
+bool is_twin(const CameraListing& a, const CameraListing& b) {
+  return a.bus != b.bus && a.name == b.name && a.serial == b.serial;
+}
+
+std::string link_below(const CameraListing& listing, std::string_view folder) {
+  const auto found = std::ranges::find_if(listing.links, [&](const std::string& link) {
+    return link.find(folder) != std::string::npos;
+  });
+  return found == listing.links.end() ? std::string() : *found;
+}
+
+std::string indented(const std::string& text, const std::string& margin) {
+  std::string result;
+  for (std::size_t start = 0; start < text.size();) {
+    const std::size_t end = std::min(text.find('\n', start), text.size());
+    result += margin + text.substr(start, end - start) + "\n";
+    start = end + 1;
+  }
+  return result;
+}
+
+std::string row(const char* name, const std::string& text) {
+  std::string line = "  " + std::string(name);
+  line.resize(12, ' ');
+  return line + printable(text) + "\n";
+}
+
+std::string choice(const std::string& source, const std::string& path) {
+  return "  to use it, in /etc/loopd/NAME.toml:\n" +
+         indented(config_snippet(source, path), "      ");
+}
+
+bool is_readable(const V4l2Mode& mode) { return mode.format.has_value(); }
+
+std::string modes_text(const std::vector<V4l2Mode>& modes) {
+  std::string text;
+  for (const V4l2Mode& mode : modes)
+    text += row(text.empty() ? "formats" : "",
+                mode_text(mode) + (is_readable(mode) ? "" : "  (not read here)"));
+  if (!modes.empty() && std::ranges::none_of(modes, is_readable))
+    text += row("", "none of them can be read here: it may work through libcamera");
+  return text;
+}
+
+std::string v4l2_text(const CameraListing& listing, const std::vector<CameraListing>& all) {
+  std::string text =
+      listing.node + ": " + printable(listing.name.empty() ? "camera" : listing.name) + "\n";
+  for (const std::string& link : listing.links) text += row("link", link);
+  if (!listing.serial.empty()) text += row("serial", listing.serial);
+  if (!listing.driver.empty()) text += row("driver", listing.driver + ", " + listing.bus);
+  text += modes_text(listing.modes);
+  if (!listing.problem.empty()) text += row("problem", listing.problem);
+  return text + choice("v4l2", best_path(listing, all));
+}
+
+std::string libcamera_text(const LibcameraListing& listing) {
+  std::string text = "libcamera: " + printable(listing.model.empty() ? listing.id : listing.model) +
+                     "\n" + row("id", listing.id);
+  for (const std::string& node : listing.nodes) text += row("node", node);
+  for (const std::string& format : listing.formats) text += row("format", format);
+  for (const std::string& format : listing.other_formats)
+    text += row("format", format + "  (not read here)");
+  if (!listing.problem.empty()) text += row("problem", listing.problem);
+  return text + choice("libcamera", listing.id);
+}
+
+Json mode_json(const V4l2Mode& mode) {
+  Json json{{"fourcc", fourcc_text(mode.fourcc)}, {"readable", is_readable(mode)}};
+  json["sizes"] = Json::array();
+  for (const V4l2Size& size : mode.sizes)
+    json["sizes"].push_back(
+        {{"width", size.width_px}, {"height", size.height_px}, {"fps", size.fps}});
+  if (mode.range) {
+    json["range"] = {{"min_width", mode.range->min_width_px},
+                     {"max_width", mode.range->max_width_px},
+                     {"min_height", mode.range->min_height_px},
+                     {"max_height", mode.range->max_height_px}};
+  }
+  return json;
+}
+
+Json v4l2_json(const CameraListing& listing, const std::vector<CameraListing>& all) {
+  Json json{{"source", "v4l2"},          {"path", best_path(listing, all)},
+            {"node", listing.node},      {"links", listing.links},
+            {"id", listing.id},          {"name", listing.name},
+            {"serial", listing.serial},  {"driver", listing.driver},
+            {"bus", listing.bus},        {"formats", Json::array()},
+            {"problem", listing.problem}};
+  for (const V4l2Mode& mode : listing.modes) json["formats"].push_back(mode_json(mode));
+  return json;
+}
+
+Json libcamera_json(const LibcameraListing& listing) {
+  return {{"source", "libcamera"},      {"path", listing.id},
+          {"name", listing.model},      {"nodes", listing.nodes},
+          {"formats", listing.formats}, {"other_formats", listing.other_formats},
+          {"problem", listing.problem}};
+}
+
+}  // namespace
+
+CameraList find_cameras() {
+  CameraList list;
+  list.v4l2 = list_v4l2_cameras();
+  list.build = libcamera_build();
+  if (!list.build.present) return list;
+  auto listings = list_libcamera_cameras();
+  if (listings) {
+    list.libcamera = std::move(listings).value();
+  } else {
+    list.libcamera_problem = listings.error().message;
+  }
+  return list;
+}
+
+std::string best_path(const CameraListing& listing, const std::vector<CameraListing>& all) {
+  const bool unique =
+      std::ranges::none_of(all, [&](const auto& other) { return is_twin(listing, other); });
+  if (unique) {
+    if (std::string link = link_below(listing, "/by-id/"); !link.empty()) return link;
+    if (!listing.serial.empty()) return "serial:" + listing.serial;
+  }
+  std::string link = link_below(listing, "/by-path/");
+  return link.empty() ? listing.node : link;
+}
+
+std::string config_snippet(const std::string& source, const std::string& path) {
+  return "[camera]\nsource = " + toml_string(source) + "\npath = " + toml_string(path) + "\n";
+}
+
+std::string cameras_text(const CameraList& list) {
+  std::string text;
+  const auto add = [&text](const std::string& block) {
+    text += (text.empty() ? "" : "\n") + block;
+  };
+  for (const CameraListing& listing : list.v4l2) add(v4l2_text(listing, list.v4l2));
+  for (const LibcameraListing& listing : list.libcamera) add(libcamera_text(listing));
+  if (text.empty()) text = kNone;
+  if (!list.build.present) add("libcamera: " + list.build.text + "\n");
+  if (!list.libcamera_problem.empty())
+    add("libcamera: " + printable(list.libcamera_problem) + "\n");
+  return text;
+}
+
+Json cameras_json(const CameraList& list) {
+  Json json{{"cameras", Json::array()},
+            {"libcamera", {{"present", list.build.present}, {"text", list.build.text}}}};
+  for (const CameraListing& listing : list.v4l2)
+    json["cameras"].push_back(v4l2_json(listing, list.v4l2));
+  for (const LibcameraListing& listing : list.libcamera)
+    json["cameras"].push_back(libcamera_json(listing));
+  if (!list.libcamera_problem.empty()) json["libcamera"]["problem"] = list.libcamera_problem;
+  return json;
+}
+
+int cameras(bool json, std::ostream& out) {
+  const CameraList list = find_cameras();
+  if (json) {
+    out << dump(cameras_json(list)) << std::endl;
+  } else {
+    out << cameras_text(list) << std::flush;
+  }
+  return out && !(list.v4l2.empty() && list.libcamera.empty()) ? 0 : 1;
+}
+
+}  // namespace loopd::loopctl
