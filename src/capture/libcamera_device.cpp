@@ -68,11 +68,6 @@ std::string format_names(const libcamera::StreamFormats& formats) {
   return names.empty() ? "none" : names;
 }
 
-// How far a sequence number lies after another; those of the kernel have 32 bits and wrap.
-std::int32_t ahead_of(std::uint32_t later, std::uint32_t earlier) {
-  return static_cast<std::int32_t>(later - earlier);
-}
-
 std::string size_text(FrameSize size) {
   return std::to_string(size.width_px) + "x" + std::to_string(size.height_px);
 }
@@ -287,7 +282,8 @@ std::optional<RawFrame> LibcameraDevice::newest_frame() {
     --queued_;
     if (requests_[index]->status() != libcamera::Request::RequestComplete) {
       withdraw(-EIO);
-    } else if (late(index)) {
+    } else if (comes_late(metadata(index).sequence, last_sequence_, requests_.size())) {
+      // Seen with a USB camera on a machine that was too busy.
       passed_over += intact(index) ? 1 : 0;
       requeue(index);
     } else {
@@ -304,20 +300,12 @@ std::optional<RawFrame> LibcameraDevice::newest_frame() {
 std::optional<std::size_t> LibcameraDevice::better(std::optional<std::size_t> best,
                                                    std::size_t next, std::uint64_t& passed_over) {
   if (!best) return next;
-  const std::int32_t ahead = ahead_of(metadata(next).sequence, metadata(*best).sequence);
+  const std::int32_t ahead = sequence_ahead(metadata(next).sequence, metadata(*best).sequence);
   const bool next_wins = intact(next) != intact(*best) ? intact(next) : ahead > 0;
   const std::size_t other = next_wins ? *best : next;
   passed_over += intact(other) ? 1 : 0;
   requeue(other);
   return next_wins ? next : *best;
-}
-
-// Whether a frame is older than one that was given out already: seen with USB cameras on a machine
-// that is too busy. A sequence that goes back by more than there are buffers has begun anew.
-bool LibcameraDevice::late(std::size_t index) const {
-  if (!last_sequence_) return false;
-  const std::int32_t ahead = ahead_of(metadata(index).sequence, *last_sequence_);
-  return ahead < 0 && ahead >= -static_cast<std::int32_t>(CompletionBoard::kMaxBuffers);
 }
 
 RawFrame LibcameraDevice::read(std::size_t index) {

@@ -62,7 +62,6 @@ class LibcameraDevice final : public CaptureDevice {
   std::optional<RawFrame> newest_frame();
   std::optional<std::size_t> better(std::optional<std::size_t> best, std::size_t next,
                                     std::uint64_t& passed_over);
-  bool late(std::size_t index) const;
   RawFrame read(std::size_t index);
   Grab nothing_came();
 

@@ -99,4 +99,14 @@ RawFrame raw_frame(const FrameLayout& layout, std::span<const std::uint8_t> plan
   return frame;
 }
 
+std::int32_t sequence_ahead(std::uint32_t later, std::uint32_t earlier) {
+  return static_cast<std::int32_t>(later - earlier);
+}
+
+bool comes_late(std::uint32_t sequence, std::optional<std::uint32_t> last, std::size_t buffers) {
+  if (!last) return false;
+  const std::uint32_t behind = *last - sequence;
+  return behind != 0 && behind <= buffers;
+}
+
 }  // namespace loopd

@@ -60,4 +60,13 @@ std::optional<FrameLayout> checked_layout(PixelFormat format, unsigned width, un
 RawFrame raw_frame(const FrameLayout& layout, std::span<const std::uint8_t> plane,
                    std::size_t bytes_used);
 
+/// How far a frame's sequence number lies after another's; those of the kernel have 32 bits and
+/// wrap.
+std::int32_t sequence_ahead(std::uint32_t later, std::uint32_t earlier);
+
+/// Whether a frame is older than `last`, which was given out already, so that it comes too late. A
+/// sequence that goes back by more than `buffers`, which is more than can be under way, has begun
+/// anew instead; one that stands still is not late.
+bool comes_late(std::uint32_t sequence, std::optional<std::uint32_t> last, std::size_t buffers);
+
 }  // namespace loopd

@@ -101,5 +101,28 @@ TEST(RawFrameOf, NeverReachesBeyondThePlane) {
   EXPECT_EQ(most.stride_bytes, 10);
 }
 
+constexpr std::uint32_t kLastNumber = std::numeric_limits<std::uint32_t>::max();
+
+TEST(Sequence, WrapsAsTheKernelsDoes) {
+  EXPECT_EQ(sequence_ahead(5, 3), 2);
+  EXPECT_EQ(sequence_ahead(3, 5), -2);
+  EXPECT_EQ(sequence_ahead(1, kLastNumber), 2);
+  EXPECT_EQ(sequence_ahead(kLastNumber, 1), -2);
+}
+
+TEST(Sequence, AFrameBehindTheLastOneIsLate) {
+  EXPECT_FALSE(comes_late(0, std::nullopt, 4));
+  EXPECT_FALSE(comes_late(8, 7, 4));
+  EXPECT_TRUE(comes_late(6, 7, 4));
+  EXPECT_TRUE(comes_late(3, 7, 4));
+  EXPECT_TRUE(comes_late(kLastNumber, 1, 4));
+}
+
+TEST(Sequence, OneThatStandsStillOrBeginsAnewIsNot) {
+  EXPECT_FALSE(comes_late(7, 7, 4));
+  EXPECT_FALSE(comes_late(2, 7, 4));
+  EXPECT_FALSE(comes_late(0, 1000, 4));
+}
+
 }  // namespace
 }  // namespace loopd
