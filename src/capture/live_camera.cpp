@@ -190,10 +190,16 @@ class LiveCamera : public Camera {
     return any_frame_ ? timeout_ns_ : std::max(timeout_ns_, first_frame_ns_);
   }
 
+  // The first frame of an opening took so long; the next opening's may take twice that.
+  void learn_start(std::int64_t took_ns) {
+    first_frame_ns_ = took_ns > timeout_ns_ ? std::min(2 * took_ns, kLongestFirstFrame_ns) : 0;
+  }
+
   std::optional<CameraEvent> deliver(const RawFrame& raw) {
     const std::int64_t now_ns = clock_->now_ns();
     const SequenceLedger::Entry entry = sequences_.enter(raw.sequence, raw.passed_over, now_ns);
     dropped_ += entry.lost + raw.passed_over;
+    if (!any_frame_) learn_start(now_ns - last_frame_ns_);
     any_frame_ = true;
     last_frame_ns_ = now_ns;
     if (raw.damaged)

@@ -30,8 +30,9 @@ class LiveClock {
 /// driver's hotplug_fd() tells of a change); the first frame after it means that the camera is
 /// back. While it stays away, the reason is told twice a second. Time-out: no frame for
 /// max(1 s, 5 frame times) is kStalled (or what the device knows of the cause), and the device is
-/// closed and opened again; so is one that for that long gives only damaged frames. A camera that
-/// has ever needed longer for the first frame after opening is given up to 4 s for that one.
+/// closed and opened again; so is one that for that long gives only damaged frames. A camera from
+/// which nothing comes after opening is given twice as long each time, up to 4 s, and keeps that if
+/// it turns out to need it.
 ///
 /// Frames: the newest wins; those passed over, gaps in the driver's sequence, and frames for which
 /// no buffer was free are counted by dropped(). Damaged, short and undecodable ones are errors

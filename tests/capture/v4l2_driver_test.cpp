@@ -126,6 +126,14 @@ TEST_F(V4l2DriverTest, SizesNoPictureHasAreRefused) {
   }
 }
 
+TEST_F(V4l2DriverTest, InterlacedFieldsAreAWarning) {
+  camera().lie = [](unsigned long request, void* argument) {
+    if (request == VIDIOC_S_FMT)
+      static_cast<v4l2_format*>(argument)->fmt.pix.field = V4L2_FIELD_INTERLACED;
+  };
+  EXPECT_THAT(opened()->info().warnings, ElementsAre(HasSubstr("interlaced")));
+}
+
 TEST_F(V4l2DriverTest, SizesInStepsGiveTheNearestStep) {
   V4l2Mode mode;
   mode.range = V4l2SizeRange{16, 1920, 16, 16, 1080, 8};
