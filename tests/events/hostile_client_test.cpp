@@ -2,6 +2,7 @@
 
 #include <random>
 
+#include "events/control_fixture.h"
 #include "events/sample_report.h"
 #include "events/server_fixture.h"
 
@@ -134,6 +135,24 @@ TEST_F(HostileClientTest, ConnectionsThatComeAndGoHarmNobody) {
   server_->publish(testing::sample_report());
   EXPECT_TRUE(watcher->wait_for("loop"));
   EXPECT_TRUE(loop_.run_until([&] { return server_->clients() == 1; }));
+}
+
+TEST_F(HostileClientTest, DescriptorsAreNotTaken) {
+  options_.seqpacket_path = seqpacket_path(options_.socket_path);
+  start();
+  const auto lines = connect();
+  TestClient packets(loop_, options_.seqpacket_path, SOCK_SEQPACKET);
+  ASSERT_TRUE(packets.wait_for("hello"));
+  const UniqueFd file = testing::memory_file();
+  const std::size_t before = testing::open_descriptors();
+  for (int i = 0; i < 50; ++i) {
+    const std::vector<int> fds(100, file.get());
+    ASSERT_TRUE(testing::send_with(lines->fd(), "{\"op\":\"watch\"}\n", fds));
+    ASSERT_TRUE(testing::send_with(packets.fd(), "{\"op\":\"watch\"}", fds));
+    ASSERT_TRUE(lines->wait_for("watch", static_cast<std::size_t>(i) + 1));
+    ASSERT_TRUE(packets.wait_for("watch", static_cast<std::size_t>(i) + 1));
+    EXPECT_EQ(testing::open_descriptors(), before);
+  }
 }
 
 }  // namespace
