@@ -3,6 +3,7 @@
 #include <cerrno>
 
 #include "capture/libcamera_driver.h"
+#include "capture/libcamera_error.h"
 
 namespace loopd {
 namespace {
@@ -14,14 +15,7 @@ class AbsentDriver final : public CaptureDriver {
  public:
   explicit AbsentDriver(std::string camera) : camera_(std::move(camera)) {}
 
-  Opened open() override {
-    CameraError error;
-    error.fault = CameraFault::kUnsupported;
-    error.message = kAbsent;
-    error.code = ENOTSUP;
-    error.lost = true;
-    return error;
-  }
+  Opened open() override { return lost_camera(CameraFault::kUnsupported, kAbsent, ENOTSUP); }
 
   std::string describe() const override { return "libcamera camera " + camera_; }
 

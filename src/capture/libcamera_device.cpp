@@ -8,57 +8,26 @@
 #include <array>
 #include <bit>
 #include <cerrno>
-#include <system_error>
 
 #include "base/clock.h"
 #include "capture/libcamera_controls.h"
+#include "capture/libcamera_error.h"
 
 namespace loopd {
 namespace {
 
 constexpr unsigned kLeastBuffers = 4;  // one is read, one is ready, two are with the device
 
-CameraError camera_error(CameraFault fault, std::string message, int code) {
-  CameraError error;
-  error.fault = fault;
-  error.message = std::move(message);
-  error.code = code;
-  error.lost = true;
-  return error;
-}
-
-struct Cause {
-  CameraFault fault;
-  const char* remedy;
-};
-
-// What an error of libcamera means, and what to do about it.
-Cause cause_of(int code) {
-  switch (code) {
-    case EBUSY:
-      return {CameraFault::kBusy, "end the other program that uses it"};
-    case EACCES:
-    case EPERM:
-      return {CameraFault::kPermission, "let this user read and write the camera's nodes in /dev"};
-    case ENODEV:
-    case ENXIO:
-      return {CameraFault::kNoDevice, "plug it in again"};
-    default:
-      return {CameraFault::kStreamError,
-              "set LIBCAMERA_LOG_LEVELS=*:INFO to see what libcamera says"};
-  }
-}
-
 // The pixel format that is wanted: none for "auto"; an error for a name that is none.
 std::variant<std::optional<PixelFormat>, CameraError> wanted_format(const std::string& name) {
   if (name.empty() || name == "auto") return std::optional<PixelFormat>();
   const auto format = pixel_format_from_name(name);
   if (format) return format;
-  return camera_error(CameraFault::kUnsupported,
-                      "the pixel format \"" + name +
-                          "\" is not known; use auto, or a code such as "
-                          "YUYV or MJPG",
-                      EINVAL);
+  return lost_camera(CameraFault::kUnsupported,
+                     "the pixel format \"" + name +
+                         "\" is not known; use auto, or a code such as "
+                         "YUYV or MJPG",
+                     EINVAL);
 }
 
 std::string format_names(const libcamera::StreamFormats& formats) {
@@ -146,16 +115,17 @@ LibcameraDevice::Problem LibcameraDevice::choose(const LibcameraOptions& options
   const FrameSize wanted = any_size ? FrameSize{static_cast<int>(stream.size.width & 0xffff),
                                                 static_cast<int>(stream.size.height & 0xffff)}
                                     : FrameSize{options.width_px, options.height_px};
-  const std::vector<FormatOffer> offers = format_offers(stream.formats());
+  std::vector<FormatOffer> offers = format_offers(stream.formats());
+  if (offers.empty())  // a pipeline that lists nothing; what it proposes is what it has
+    offers.push_back({stream.pixelFormat.fourcc(), stream.pixelFormat.modifier(), {}, {}, {}, {}});
   const auto choice = choose_format(offers, std::get<0>(only), wanted);
   if (!choice)
-    return camera_error(
-        CameraFault::kUnsupported,
-        "cannot use the camera " + camera_->id() + ": no pixel format of it (" +
-            format_names(stream.formats()) + ") can be read" +
-            (std::get<0>(only) ? " as " + options.format + "; set the format to auto"
-                               : "; use another camera"),
-        ENOTSUP);
+    return lost_camera(CameraFault::kUnsupported,
+                       "cannot use the camera " + camera_->id() + ": no pixel format of it (" +
+                           format_names(stream.formats()) + ") can be read" +
+                           (std::get<0>(only) ? " as " + options.format + "; set the format to auto"
+                                              : "; use another camera"),
+                       ENOTSUP);
   stream.pixelFormat =
       libcamera::PixelFormat(offers[choice->offer].code, offers[choice->offer].modifier);
   stream.size = libcamera::Size(static_cast<unsigned>(choice->size.width_px),
@@ -175,6 +145,10 @@ LibcameraDevice::Problem LibcameraDevice::configure(const LibcameraOptions& opti
       pixel_format_from_drm(stream.pixelFormat.fourcc(), stream.pixelFormat.modifier());
   if (!format)
     return failed("it insists on " + stream.toString() + ", which cannot be read", -ENOTSUP);
+  if (!options.format.empty() && options.format != "auto" &&
+      *format != pixel_format_from_name(options.format))
+    info_.warnings.push_back("the camera gives " + std::string(pixel_format_name(*format)) +
+                             " instead of " + options.format);
   const int status = camera_->configure(config_.get());
   if (status < 0) return failed("it cannot be set to " + stream.toString(), status);
   const auto layout = checked_layout(*format, stream.size.width, stream.size.height, stream.stride);
@@ -379,17 +353,12 @@ bool LibcameraDevice::nodes_present() const {
 }
 
 CameraError LibcameraDevice::failed(const std::string& what, int status) const {
-  const int code = -status;
-  const Cause cause = cause_of(code);
-  return camera_error(cause.fault,
-                      "cannot use the camera " + camera_->id() + ": " + what + " (" +
-                          std::generic_category().message(code) + "); " + cause.remedy,
-                      code);
+  return libcamera_failure(camera_->id(), what, status);
 }
 
 CameraError LibcameraDevice::unplugged() const {
-  return camera_error(CameraFault::kUnplugged,
-                      "the camera " + camera_->id() + " has gone away; plug it in again", ENODEV);
+  return lost_camera(CameraFault::kUnplugged,
+                     "the camera " + camera_->id() + " has gone away; plug it in again", ENODEV);
 }
 
 }  // namespace loopd

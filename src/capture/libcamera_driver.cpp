@@ -10,6 +10,7 @@
 #include "base/unique_fd.h"
 #include "capture/libcamera_dev_watch.h"
 #include "capture/libcamera_device.h"
+#include "capture/libcamera_error.h"
 #include "capture/libcamera_manager.h"
 #include "capture/libcamera_selection.h"
 
@@ -17,12 +18,8 @@ namespace loopd {
 namespace {
 
 CameraError not_started(const Error& error) {
-  CameraError result;
-  result.fault = error.code == EBUSY ? CameraFault::kBusy : CameraFault::kStreamError;
-  result.message = error.message;
-  result.code = error.code;
-  result.lost = true;
-  return result;
+  return lost_camera(error.code == EBUSY ? CameraFault::kBusy : CameraFault::kStreamError,
+                     error.message, error.code);
 }
 
 // libcamera passes over in silence what it may not open. A media device that this process may not
@@ -31,14 +28,13 @@ std::optional<CameraError> forbidden_media_device() {
   for (int i = 0; i < 64; ++i) {
     const std::string path = "/dev/media" + std::to_string(i);
     const UniqueFd fd(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
-    if (fd.valid() || (errno != EACCES && errno != EPERM)) continue;
-    CameraError error;
-    error.fault = CameraFault::kPermission;
-    error.code = errno;
-    error.message = "libcamera sees no camera that fits, and may not open " + path +
-                    "; let this user read and write it (group video, DeviceAllow= of the service)";
-    error.lost = true;
-    return error;
+    const int code = errno;
+    if (fd.valid() || (code != EACCES && code != EPERM)) continue;
+    return lost_camera(CameraFault::kPermission,
+                       "libcamera sees no camera that fits, and may not open " + path +
+                           "; let this user read and write it (group video, DeviceAllow= of the "
+                           "service)",
+                       code);
   }
   return std::nullopt;
 }

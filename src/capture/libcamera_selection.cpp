@@ -3,16 +3,13 @@
 #include <cerrno>
 #include <vector>
 
+#include "capture/libcamera_error.h"
+
 namespace loopd {
 namespace {
 
 CameraError no_device(std::string message) {
-  CameraError error;
-  error.fault = CameraFault::kNoDevice;
-  error.message = std::move(message);
-  error.code = ENODEV;
-  error.lost = true;
-  return error;
+  return lost_camera(CameraFault::kNoDevice, std::move(message), ENODEV);
 }
 
 std::string listed(std::span<const CameraName> cameras) {

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <cerrno>
 #include <vector>
+
+#include "capture/libcamera_error.h"
 
 namespace loopd {
 namespace {
@@ -83,6 +86,19 @@ TEST(CameraSelection, AWholeIdTakesNoOther) {
   CameraSelection selection(kFront.id);
   selection.keep(Cameras{kFront, kRear}, 0);
   EXPECT_EQ(chosen(selection, {kRear, kFrontMoved}), "no_device");
+}
+
+TEST(LibcameraFailure, NamesTheCauseAndTheRemedy) {
+  const CameraError busy = libcamera_failure("cam", "it cannot be taken", -EBUSY);
+  EXPECT_EQ(busy.fault, CameraFault::kBusy);
+  EXPECT_EQ(busy.code, EBUSY);
+  EXPECT_TRUE(busy.lost);
+  EXPECT_NE(busy.message.find("cam: it cannot be taken"), std::string::npos) << busy.message;
+  EXPECT_NE(busy.message.find("; end the other program"), std::string::npos) << busy.message;
+  EXPECT_EQ(libcamera_failure("cam", "x", -EPERM).fault, CameraFault::kPermission);
+  EXPECT_EQ(libcamera_failure("cam", "x", -ENODEV).fault, CameraFault::kNoDevice);
+  EXPECT_EQ(libcamera_failure("cam", "x", -ENOTSUP).fault, CameraFault::kUnsupported);
+  EXPECT_EQ(libcamera_failure("cam", "x", -EINVAL).fault, CameraFault::kStreamError);
 }
 
 }  // namespace
