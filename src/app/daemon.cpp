@@ -41,8 +41,6 @@ Identity identity_of(const DaemonConfig& config, const std::string& version) {
   return identity;
 }
 
-std::string folder_of(const std::string& path) { return path.substr(0, path.rfind('/') + 1); }
-
 /// The sockets that systemd listens on for us.
 InheritedSockets inherited_sockets() {
   const int count = sd_listen_fds(1);  // not for children
@@ -55,7 +53,7 @@ ServerOptions server_options(const DaemonConfig& config) {
   ServerOptions options;
   options.socket_path = event_socket_path(config);
   options.seqpacket_path = seqpacket_path(options.socket_path);
-  options.ledger_path = folder_of(options.socket_path) + "ledger";
+  options.ledger_path = beside_event_socket(config, "ledger");
   options.history_bytes = static_cast<std::size_t>(config.events.history_kib) * 1024;
   options.max_clients = config.events.max_clients;
   options.client_queue_bytes = static_cast<std::size_t>(config.events.client_queue_kib) * 1024;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <utility>
 
@@ -121,7 +122,7 @@ const std::array kOwnParameters = {
         LOOPD_REF(events.socket)},
     Row{"events.control_socket", "", 0, kLongestSocketPath,
         "Path of the socket for those who may change what the daemon does, its owner and group; "
-        "empty = control.sock beside the event socket.",
+        "empty = control.sock in the folder of events.sock, NAME.control.sock beside NAME.sock.",
         LOOPD_REF(events.control_socket)},
     Row{"events.max_clients", "clients", 1, 1024, "One more is told so and closed.",
         LOOPD_REF(events.max_clients)},
@@ -231,10 +232,15 @@ std::string event_socket_path(const DaemonConfig& config) {
   return "/run/loopd/" + config.camera.name + "/events.sock";
 }
 
+std::string beside_event_socket(const DaemonConfig& config, const std::string& name) {
+  const std::filesystem::path events = event_socket_path(config);
+  if (events.filename() == "events.sock") return events.parent_path() / name;
+  return events.parent_path() / (events.stem().string() + "." + name);
+}
+
 std::string control_socket_path(const DaemonConfig& config) {
   if (!config.events.control_socket.empty()) return config.events.control_socket;
-  const std::string events = event_socket_path(config);
-  return events.substr(0, events.rfind('/') + 1) + "control.sock";
+  return beside_event_socket(config, "control.sock");
 }
 
 std::vector<std::pair<std::string, std::string>> camera_controls(const CameraConfig& camera) {

@@ -85,7 +85,12 @@ std::vector<std::string> missing_for_daemon(const DaemonConfig& config);
 /// events.socket, or where the socket is if that is empty: /run/loopd/<camera.name>/events.sock.
 std::string event_socket_path(const DaemonConfig& config);
 
-/// events.control_socket, or control.sock in the folder of the event socket.
+/// The path of another file that belongs to the event socket: /run/loopd/front/events.sock and
+/// "ledger" give /run/loopd/front/ledger; a socket of another name, such as /tmp/a.sock, gives
+/// /tmp/a.ledger, so that many may share a folder.
+std::string beside_event_socket(const DaemonConfig& config, const std::string& name);
+
+/// events.control_socket, or "control.sock" beside the event socket.
 std::string control_socket_path(const DaemonConfig& config);
 
 /// camera.controls, "name=value" separated by spaces, taken apart; what is not of this

@@ -209,6 +209,39 @@ TEST(DaemonConfig, SocketPathFollowsTheCameraUnlessGiven) {
   EXPECT_EQ(event_socket_path(config), "/tmp/x.sock");
 }
 
+TEST(DaemonConfig, OtherFilesFollowTheEventSocket) {
+  DaemonConfig config;
+  EXPECT_EQ(control_socket_path(config), "/run/loopd/front/control.sock");
+  EXPECT_EQ(beside_event_socket(config, "ledger"), "/run/loopd/front/ledger");
+  config.events.socket = "/tmp/walk.sock";
+  EXPECT_EQ(control_socket_path(config), "/tmp/walk.control.sock");
+  config.events.control_socket = "/tmp/c";
+  EXPECT_EQ(control_socket_path(config), "/tmp/c");
+}
+
+TEST(DaemonConfig, ControlsAreTakenApart) {
+  CameraConfig camera;
+  EXPECT_THAT(camera_controls(camera), IsEmpty());
+  camera.controls = "  gain=20 colour_gains=1.5,2  ";
+  const std::vector<std::pair<std::string, std::string>> expected = {{"gain", "20"},
+                                                                     {"colour_gains", "1.5,2"}};
+  EXPECT_EQ(camera_controls(camera), expected);
+}
+
+TEST(DaemonConfig, WhatALiveCameraCannotHaveIsNamed) {
+  DaemonConfig config;
+  config.camera.source = "v4l2";
+  EXPECT_THAT(validate(config), IsEmpty());
+  EXPECT_THAT(missing_for_daemon(config), ElementsAre(HasSubstr("loopctl cameras")));
+  config.camera.faults = "unplug@3:1s";
+  config.camera.controls = "gain";
+  EXPECT_THAT(validate(config), ElementsAre(HasSubstr("camera.controls = \"gain\""),
+                                            HasSubstr("camera.faults = \"unplug@3:1s\"")));
+  config.camera = CameraConfig();
+  config.camera.source = "libcamera";
+  EXPECT_THAT(missing_for_daemon(config), IsEmpty());
+}
+
 TEST(DaemonConfig, SocketPathTooLongForTheKernelIsNamed) {
   DaemonConfig config;
   config.events.socket = std::string(108, 'x');

@@ -19,7 +19,7 @@ using testing::LoopSeen;
 class DaemonControlTest : public DaemonTest {
  protected:
   ControlClient control() {
-    return ControlClient::connect((folder_ / "control.sock").string()).value();
+    return ControlClient::connect((folder_ / "s.control.sock").string()).value();
   }
 
   static json asked(ControlClient& client, ControlOp op) {
