@@ -286,8 +286,11 @@ std::optional<CameraError> negotiate(const V4l2Context& context, std::uint32_t t
                                      V4l2Stream& stream) {
   v4l2_format current{};
   current.type = type;
-  if (const int result = context.node.call(VIDIOC_G_FMT, current); result < 0)
-    return error(context, "ask for the format of", result);
+  const int result = context.node.call(VIDIOC_G_FMT, current);
+  if (result == -EINVAL)  // v4l2loopback, until something feeds it
+    return v4l2_fault(CameraFault::kNoSignal, context.path,
+                      "has no picture format; if it is a loopback device, start what feeds it");
+  if (result < 0) return error(context, "ask for the format of", result);
   const Format now = format_of(current);
   if (wish.width_px < 1)
     wish.width_px = static_cast<int>(std::clamp(now.width_px, 1u, kMaxSide_px));

@@ -117,6 +117,13 @@ TEST_F(V4l2DriverTest, ADriverThatListsNothingIsTakenAsItIsSet) {
   EXPECT_EQ(chosen({}).substr(0, 8), "YUYV 8x4");
 }
 
+TEST_F(V4l2DriverTest, ALoopbackDeviceThatNothingFeedsHasNoSignal) {
+  camera().faults[VIDIOC_G_FMT] = {-EINVAL, -1};
+  const CameraError error = open_error();
+  EXPECT_EQ(error.fault, CameraFault::kNoSignal);
+  EXPECT_THAT(error.message, HasSubstr("feeds"));
+}
+
 TEST_F(V4l2DriverTest, SizesNoPictureHasAreRefused) {
   for (const std::uint32_t side : {0u, 65536u, 0xffffffffu}) {
     camera().lie = [=](unsigned long request, void* argument) {
