@@ -58,7 +58,8 @@ class Progress:
 class Case:
     """One case of the plan and the folder of its results."""
 
-    def __init__(self, plan):
+    def __init__(self, plan, environment):
+        self.environment = environment
         self.name = plan["name"]
         self.timeout_s = plan["timeout_s"]
         self.own_boot = plan["own_boot"]
@@ -76,6 +77,7 @@ class Case:
                     ["systemd-run", "--quiet", "--wait", "--pipe", "--collect", f"--unit={unit}",
                      f"--property=RuntimeMaxSec={self.timeout_s}", "--property=TimeoutStopSec=5",
                      "--setenv=PYTHONUNBUFFERED=1",
+                     *(f"--setenv={name}={value}" for name, value in self.environment.items()),
                      "python3", "-B", f"{SHARE}/guest/run_case.py", self.name, part],
                     stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, timeout=self.timeout_s + 30)
             except subprocess.TimeoutExpired:
@@ -190,7 +192,8 @@ def run_case(case, progress):
 
 def main():
     with open(PLAN) as file:
-        cases = [Case(entry) for entry in json.load(file)]
+        plan = json.load(file)
+    cases = [Case(entry, plan["environment"]) for entry in plan["cases"]]
     progress = Progress()
     if progress.current and not progress.expected_boot:
         case = next(case for case in cases if case.name == progress.current)

@@ -22,9 +22,9 @@ def settle():
     sh("udevadm", "settle", "--timeout=30")
 
 
-def v4l2(device, *options, within_s=60):
+def v4l2(device, *options, within_s=60, may_fail=False):
     """v4l2-ctl on a device; returns what it printed."""
-    return sh("v4l2-ctl", "-d", device, *options, within_s=within_s)
+    return sh("v4l2-ctl", "-d", device, *options, within_s=within_s, may_fail=may_fail)
 
 
 def control(device, **values):
