@@ -64,6 +64,7 @@ LibcameraDevice::LibcameraDevice(std::shared_ptr<LibcameraManager> manager,
       watch_(std::move(watch)),
       nodes_(manager_->nodes(*camera_)) {
   info_.id = stable_id(*camera_, nodes_);
+  usb_ = behind_usb(nodes_);
   // Better to look again at a camera that stayed than to miss that this one went.
   if (nodes_.empty()) nodes_ = video_nodes();
   for (const CameraNode& node : nodes_) node_names_.push_back(node.name);
@@ -91,6 +92,10 @@ LibcameraDevice::~LibcameraDevice() {
   allocator_.reset();
   if (acquired_ && !gone) camera_->release();
   config_.reset();
+  // Pipelines of sensors run an algorithm's thread, which only stop() ends; destroying it as it
+  // runs ends the process too. Such a camera is not plugged, so that it goes is rare: it is left
+  // behind.
+  if (started_ && gone && !usb_) new std::shared_ptr<libcamera::Camera>(camera_);
   camera_.reset();
 }
 

@@ -90,6 +90,7 @@ class LibcameraDevice final : public CaptureDevice {
   DevWatch watch_;
   std::vector<CameraNode> nodes_;
   std::vector<std::string> node_names_;
+  bool usb_ = false;
   StampClock clock_;
   FrameLayout layout_;
   DeviceInfo info_;

@@ -64,6 +64,15 @@ bool belongs(Manager& manager, const libcamera::Camera& camera, dev_t number) {
   }
 }
 
+// The folder of sysfs of the device behind a node; empty if there is none.
+std::filesystem::path device_folder(const CameraNode& node) {
+  std::error_code error;
+  auto folder = std::filesystem::canonical("/sys/dev/char/" + std::to_string(major(node.number)) +
+                                               ":" + std::to_string(minor(node.number)) + "/device",
+                                           error);
+  return error ? std::filesystem::path() : folder;
+}
+
 FrameSize frame_size(const libcamera::Size& size) {
   const auto bounded = [](unsigned value) {
     return static_cast<int>(std::min<unsigned>(value, INT_MAX));
@@ -130,15 +139,14 @@ CameraName camera_name(const libcamera::Camera& camera) {
 
 std::string stable_id(const libcamera::Camera& camera, const std::vector<CameraNode>& nodes) {
   if (nodes.empty()) return camera.id();
-  const dev_t number = nodes.front().number;
-  const std::string link = "/sys/dev/char/" + std::to_string(major(number)) + ":" +
-                           std::to_string(minor(number)) + "/device";
-  std::error_code error;
-  const auto interface = std::filesystem::canonical(link, error);
-  std::ifstream file(interface.parent_path() / "serial");
+  std::ifstream file(device_folder(nodes.front()).parent_path() / "serial");
   std::string serial;
-  if (error || !std::getline(file, serial) || serial.empty()) return camera.id();
+  if (!std::getline(file, serial) || serial.empty()) return camera.id();
   return camera.id() + " serial " + serial;
+}
+
+bool behind_usb(const std::vector<CameraNode>& nodes) {
+  return !nodes.empty() && device_folder(nodes.front()).string().find("/usb") != std::string::npos;
 }
 
 std::vector<FormatOffer> format_offers(const libcamera::StreamFormats& formats) {

@@ -55,6 +55,9 @@ CameraName camera_name(const libcamera::Camera& camera);
 /// libcamera's id, and the serial number where the camera has one behind a USB port.
 std::string stable_id(const libcamera::Camera& camera, const std::vector<CameraNode>& nodes);
 
+/// Whether the first of the nodes belongs to a USB device.
+bool behind_usb(const std::vector<CameraNode>& nodes);
+
 /// What a stream can be set to.
 std::vector<FormatOffer> format_offers(const libcamera::StreamFormats& formats);
 
