@@ -55,30 +55,21 @@ std::string modes_text(const std::vector<V4l2Mode>& modes) {
     text += row(text.empty() ? "formats" : "",
                 mode_text(mode) + (is_readable(mode) ? "" : "  (not read here)"));
   if (!modes.empty() && std::ranges::none_of(modes, is_readable))
-    text += row("", "none of them can be read here: it may work through libcamera");
+    text += row("", "none of them can be read here");
   return text;
 }
 
-std::string v4l2_text(const CameraListing& listing, const std::vector<CameraListing>& all) {
+/// `path`: the camera.path that chooses it.
+std::string listing_text(const std::string& source, const std::string& path,
+                         const CameraListing& listing) {
   std::string text =
-      listing.node + ": " + printable(listing.name.empty() ? "camera" : listing.name) + "\n";
+      printable(listing.node + ": " + (listing.name.empty() ? "camera" : listing.name)) + "\n";
   for (const std::string& link : listing.links) text += row("link", link);
   if (!listing.serial.empty()) text += row("serial", listing.serial);
   if (!listing.driver.empty()) text += row("driver", listing.driver + ", " + listing.bus);
   text += modes_text(listing.modes);
   if (!listing.problem.empty()) text += row("problem", listing.problem);
-  return text + choice("v4l2", best_path(listing, all));
-}
-
-std::string libcamera_text(const LibcameraListing& listing) {
-  std::string text = "libcamera: " + printable(listing.model.empty() ? listing.id : listing.model) +
-                     "\n" + row("id", listing.id);
-  for (const std::string& node : listing.nodes) text += row("node", node);
-  for (const std::string& format : listing.formats) text += row("format", format);
-  for (const std::string& format : listing.other_formats)
-    text += row("format", format + "  (not read here)");
-  if (!listing.problem.empty()) text += row("problem", listing.problem);
-  return text + choice("libcamera", listing.id);
+  return text + choice(source, path);
 }
 
 Json mode_json(const V4l2Mode& mode) {
@@ -96,8 +87,9 @@ Json mode_json(const V4l2Mode& mode) {
   return json;
 }
 
-Json v4l2_json(const CameraListing& listing, const std::vector<CameraListing>& all) {
-  Json json{{"source", "v4l2"},          {"path", best_path(listing, all)},
+Json listing_json(const std::string& source, const std::string& path,
+                  const CameraListing& listing) {
+  Json json{{"source", source},          {"path", path},
             {"node", listing.node},      {"links", listing.links},
             {"id", listing.id},          {"name", listing.name},
             {"serial", listing.serial},  {"driver", listing.driver},
@@ -105,13 +97,6 @@ Json v4l2_json(const CameraListing& listing, const std::vector<CameraListing>& a
             {"problem", listing.problem}};
   for (const V4l2Mode& mode : listing.modes) json["formats"].push_back(mode_json(mode));
   return json;
-}
-
-Json libcamera_json(const LibcameraListing& listing) {
-  return {{"source", "libcamera"},      {"path", listing.id},
-          {"name", listing.model},      {"nodes", listing.nodes},
-          {"formats", listing.formats}, {"other_formats", listing.other_formats},
-          {"problem", listing.problem}};
 }
 
 }  // namespace
@@ -150,8 +135,10 @@ std::string cameras_text(const CameraList& list) {
   const auto add = [&text](const std::string& block) {
     text += (text.empty() ? "" : "\n") + block;
   };
-  for (const CameraListing& listing : list.v4l2) add(v4l2_text(listing, list.v4l2));
-  for (const LibcameraListing& listing : list.libcamera) add(libcamera_text(listing));
+  for (const CameraListing& listing : list.v4l2)
+    add(listing_text("v4l2", best_path(listing, list.v4l2), listing));
+  for (const CameraListing& listing : list.libcamera)
+    add(listing_text("libcamera", listing.node, listing));
   if (text.empty()) text = kNone;
   if (!list.build.present) add("libcamera: " + list.build.text + "\n");
   if (!list.libcamera_problem.empty())
@@ -163,9 +150,9 @@ Json cameras_json(const CameraList& list) {
   Json json{{"cameras", Json::array()},
             {"libcamera", {{"present", list.build.present}, {"text", list.build.text}}}};
   for (const CameraListing& listing : list.v4l2)
-    json["cameras"].push_back(v4l2_json(listing, list.v4l2));
-  for (const LibcameraListing& listing : list.libcamera)
-    json["cameras"].push_back(libcamera_json(listing));
+    json["cameras"].push_back(listing_json("v4l2", best_path(listing, list.v4l2), listing));
+  for (const CameraListing& listing : list.libcamera)
+    json["cameras"].push_back(listing_json("libcamera", listing.node, listing));
   if (!list.libcamera_problem.empty()) json["libcamera"]["problem"] = list.libcamera_problem;
   return json;
 }

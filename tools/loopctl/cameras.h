@@ -14,7 +14,7 @@ namespace loopd::loopctl {
 struct CameraList {
   std::vector<CameraListing> v4l2;
   LibcameraBuild build;
-  std::vector<LibcameraListing> libcamera;
+  std::vector<CameraListing> libcamera;
   std::string libcamera_problem;  ///< why libcamera could not be asked; empty: it could
 };
 

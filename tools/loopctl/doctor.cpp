@@ -11,6 +11,7 @@
 #include <sstream>
 #include <utility>
 
+#include "capture/libcamera_driver.h"
 #include "capture/v4l2_sysfs.h"
 #include "loopctl/doctor_access.h"
 #include "loopctl/doctor_camera.h"
@@ -127,12 +128,18 @@ class Examination {
     const CameraConfig& camera = config_->camera;
     if (camera.source == "v4l2") return look_at_v4l2();
     if (camera.source == "file") return look_at_frames();
+    look_at_libcamera();
+  }
+
+  void look_at_libcamera() {
     const auto listings = list_libcamera_cameras();
     if (!listings) return add({Finding::problem("camera", listings.error().message, "")});
-    Findings found = judge_libcamera(camera, listings.value());
-    const bool there = !has_problem(found);
-    add(std::move(found));
-    if (there && !daemon_works()) look_at_frames();
+    FoundCamera found = find_libcamera_camera(config_->camera, listings.value());
+    add(std::move(found.findings));
+    if (!found.listing) return;
+    if (!found.listing->modes.empty()) add(judge_modes(config_->camera, found.listing->modes));
+    if (daemon_works()) return add({Finding::ok("camera", "the daemon has it")});
+    look_at_frames();
   }
 
   void look_at_v4l2() {

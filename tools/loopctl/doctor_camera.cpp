@@ -14,6 +14,8 @@ namespace {
 
 constexpr const char* kTopic = "camera";
 constexpr const char* kSeeList = "correct camera.path; loopctl cameras lists what is there";
+constexpr const char* kPlugOrCorrect =
+    "plug the camera in, or correct camera.path; loopctl cameras lists what is there";
 
 FoundCamera no_camera(std::string text, std::string remedy) {
   return {{Finding::problem(kTopic, std::move(text), std::move(remedy))}, std::nullopt};
@@ -21,11 +23,8 @@ FoundCamera no_camera(std::string text, std::string remedy) {
 
 FoundCamera missing_camera(const std::string& path) {
   if (path.starts_with("serial:"))
-    return no_camera("no camera has the serial number " + path.substr(7),
-                     "plug it in, or correct camera.path; loopctl cameras lists what is there");
-  return no_camera(path + " is not there",
-                   "plug the camera in, or correct camera.path; loopctl cameras lists what is "
-                   "there");
+    return no_camera("no camera has the serial number " + path.substr(7), kPlugOrCorrect);
+  return no_camera(path + " is not there", kPlugOrCorrect);
 }
 
 /// Whether a path means another camera after another order of plugging in.
@@ -117,9 +116,9 @@ Finding judge_size_and_rate(const CameraConfig& camera, const std::vector<V4l2Mo
                                  formats);
 }
 
-bool means(const std::string& path, const LibcameraListing& listing) {
-  return path.empty() || listing.id.find(path) != std::string::npos ||
-         listing.model.find(path) != std::string::npos;
+bool means(const std::string& path, const CameraListing& listing) {
+  return listing.node.find(path) != std::string::npos ||
+         listing.name.find(path) != std::string::npos;
 }
 
 }  // namespace
@@ -171,30 +170,26 @@ Findings judge_modes(const CameraConfig& camera, const std::vector<V4l2Mode>& mo
                            "set camera.format = \"auto\"")};
 }
 
-Findings judge_libcamera(const CameraConfig& camera,
-                         const std::vector<LibcameraListing>& listings) {
-  std::vector<LibcameraListing> meant;
-  std::ranges::copy_if(listings, std::back_inserter(meant), [&](const LibcameraListing& listing) {
-    return means(camera.path, listing);
-  });
-  if (meant.empty()) {
-    return {Finding::problem(
-        kTopic,
-        camera.path.empty()
-            ? "libcamera finds no camera"
-            : "libcamera finds no camera whose id or model has \"" + camera.path + "\" in it",
-        "plug it in, or correct camera.path; loopctl cameras lists what is "
-        "there")};
-  }
-  const LibcameraListing& listing = meant.front();
-  const std::string name = listing.model.empty() ? listing.id : listing.model;
-  if (meant.size() > 1) {
-    return {Finding::warning(kTopic,
+FoundCamera find_libcamera_camera(const CameraConfig& camera,
+                                  const std::vector<CameraListing>& listings) {
+  std::vector<CameraListing> meant;
+  std::ranges::copy_if(listings, std::back_inserter(meant),
+                       [&](const CameraListing& listing) { return means(camera.path, listing); });
+  if (meant.empty() && camera.path.empty())
+    return no_camera("libcamera finds no camera", "plug it in; loopctl cameras says what to check");
+  if (meant.empty())
+    return no_camera("libcamera finds no camera with \"" + camera.path + "\" in its id or name",
+                     kPlugOrCorrect);
+  FoundCamera found{{}, meant.front()};
+  found.findings.push_back(
+      meant.size() == 1
+          ? Finding::ok(kTopic,
+                        "libcamera has " + meant.front().name + " (" + meant.front().node + ")")
+          : Finding::warning(kTopic,
                              "camera.path = \"" + camera.path + "\" may mean " +
                                  std::to_string(meant.size()) + " cameras of libcamera",
-                             "set camera.path = \"" + listing.id + "\"")};
-  }
-  return {Finding::ok(kTopic, "libcamera has " + name)};
+                             "set camera.path = \"" + meant.front().node + "\""));
+  return found;
 }
 
 }  // namespace loopd::loopctl

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "app/daemon_config.h"
-#include "capture/libcamera_driver.h"
 #include "capture/v4l2_list.h"
 #include "loopctl/finding.h"
 
@@ -38,7 +37,8 @@ JudgedUse judge_use(const std::string& node, const CameraUse& use);
 /// What of the wished format, size and rate the camera has.
 Findings judge_modes(const CameraConfig& camera, const std::vector<V4l2Mode>& modes);
 
-/// Whether libcamera has a camera that camera.path means.
-Findings judge_libcamera(const CameraConfig& camera, const std::vector<LibcameraListing>& listings);
+/// Which of libcamera's `listings` camera.path means: a part of its id or name, or the only one.
+FoundCamera find_libcamera_camera(const CameraConfig& camera,
+                                  const std::vector<CameraListing>& listings);
 
 }  // namespace loopd::loopctl
