@@ -112,7 +112,7 @@ void Connections::serve(Connection& client, std::uint32_t events) {
 
 void Connections::answer_requests(Connection& client) {
   std::string text;
-  while (!client.gone() && !client.queue().full()) {
+  while (!client.gone() && !client.must_read()) {
     switch (client.next_request(text)) {
       case Connection::Request::kNone:
         handler_.all_answered(client);
@@ -130,7 +130,7 @@ void Connections::answer_requests(Connection& client) {
 
 /// Called whenever one that asks nothing more was served.
 void Connections::end_of_input(Connection& client) {
-  if (client.queue().full()) return;  // requests may still wait to be answered
+  if (client.must_read()) return;  // requests may still wait to be answered
   if (client.drop_partial_request()) complain(client, "the last line has no newline: not read");
   client.flush(handler_);
   // With nothing to be told and nothing more to ask, this connection has no use.
@@ -166,10 +166,10 @@ void Connections::sweep() {
   for (const auto& client : leaving) handler_.gone(*client);
 }
 
-/// A client whose queue is full is not read from either: its answers would have no room.
+/// A client that must read first is not read from either: its answers would have no room.
 void Connections::update_interest(Connection& client) const {
-  const bool read = !client.input_closed() && !client.queue().full();
-  const bool write = !client.queue().empty();
+  const bool read = !client.input_closed() && !client.must_read();
+  const bool write = !client.queue().empty() || client.backlog;
   const std::uint32_t events = (read ? static_cast<std::uint32_t>(EPOLLIN) : 0u) |
                                (write ? static_cast<std::uint32_t>(EPOLLOUT) : 0u);
   if (!client.gone() && sd_event_source_set_io_events(client.source().get(), events) < 0) {

@@ -89,7 +89,7 @@ class EventServer::Impl : private ConnectionHandler {
   Status listen(const std::string& path, int type, Framing framing, InheritedSockets* inherited);
   void answer_watch(Watcher& client, const WatchRequest& request);
   void repeat_newest(Watcher& client);
-  bool replay_some(Watcher& client);
+  void replay_some(Watcher& client);
   void tell_losses_of_replay(Watcher& client, std::uint64_t until);
   void end_epoch_for(Watcher& client);
   void begin_record(RecordClass record_class);
@@ -153,11 +153,10 @@ void EventServer::Impl::handle(Connection& client, const std::string& request) {
   }
 }
 
-/// A client that is being sent records of the history and does not say `since` stays where it is
-/// in the stream, with its new classes: to jump to its end would lose what it has yet to get.
+/// No replay is under way: requests wait for its end.
 void EventServer::Impl::answer_watch(Watcher& client, const WatchRequest& request) {
   client.watch = request;
-  ResumePlan plan{{}, {}, client.replay.value_or(seq_ + 1)};
+  ResumePlan plan{{}, {}, seq_ + 1};
   if (request.since) {
     plan = plan_resume(*request.since, request.classes, identity_.epoch, ledger_, history_);
   }
@@ -196,18 +195,20 @@ RecordText EventServer::Impl::too_large_line(std::uint64_t seq) {
 
 // --------------------------------------------------------------------------- the history
 
-/// Sends of the history what there is room for, and what the kernel's taking makes room for.
+/// Sends of the history what there is room for. The rest waits for the next turn of the loop, and
+/// with it the client's next request, so that asking for all of it again and again holds up nobody.
 void EventServer::Impl::refill(Connection& connection) {
   Watcher& client = watcher(connection);
   client.flush(*this);
-  while (!client.gone() && client.replay && replay_some(client)) client.flush(*this);
+  if (!client.replay) return;
+  replay_some(client);
   client.backlog = client.replay.has_value();
+  client.flush(*this);
 }
 
-/// Moves the client on through the history as far as its queue takes it; whether it moved.
-bool EventServer::Impl::replay_some(Watcher& client) {
-  const std::uint64_t began = *client.replay;
-  if (began < history_.oldest() && client.queue().may_tell_gap()) {
+/// Moves the client on through the history as far as its queue takes it.
+void EventServer::Impl::replay_some(Watcher& client) {
+  if (*client.replay < history_.oldest() && client.queue().may_tell_gap()) {
     tell_losses_of_replay(client, history_.oldest());
     client.replay = history_.oldest();
   }
@@ -219,9 +220,7 @@ bool EventServer::Impl::replay_some(Watcher& client) {
     }
     ++*client.replay;
   }
-  const bool moved = *client.replay != began;
   if (*client.replay > seq_) client.replay.reset();  // live from here on
-  return moved;
 }
 
 /// The history has gone on without a client that reads it too slowly.
@@ -311,7 +310,10 @@ void EventServer::Impl::end_epoch_for(Watcher& client) {
 
 std::size_t EventServer::Impl::queued_bytes() const {
   std::size_t bytes = 0;
-  for (const auto& client : connections_.all()) bytes += client->queue().bytes();
+  for (const auto& client : connections_.all()) {
+    const std::size_t waiting = client->backlog ? 1 : 0;  // some, while the queue may be empty
+    bytes += std::max(client->queue().bytes(), waiting);
+  }
   return bytes;
 }
 

@@ -75,8 +75,9 @@ class EventServer {
   std::size_t clients() const;           ///< connected now
   std::uint64_t newest_seq() const;      ///< of the newest published record; 0 before the first
   std::uint64_t missed_records() const;  ///< not given to slow clients so far, all clients summed
-  /// Bytes queued for clients that the kernel has not taken yet. At the end of a recording the
-  /// daemon may run its loop until this is 0 (with a deadline) so that readers get everything.
+  /// Bytes queued for clients that the kernel has not taken yet, 1 at least for one that still
+  /// waits for records of the history. At the end of a recording the daemon may run its loop until
+  /// this is 0 (with a deadline) so that readers get everything.
   std::size_t queued_bytes() const;
 
  private:
