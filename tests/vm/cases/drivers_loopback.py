@@ -27,7 +27,7 @@ def run():
     device = loopback()
     for fourcc, size in SIZES.items():
         with Feeder(device, fps=8, laps=100, fourcc=fourcc) as feeder:
-            feeder.line()
+            feeder.shown()
             capture(device, 30, to="/tmp/frames")
         with open("/tmp/frames", "rb") as file:
             frames = [file.read(size) for _ in range(30)]

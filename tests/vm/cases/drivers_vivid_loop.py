@@ -22,7 +22,7 @@ def run():
     camera, output = vivid_loop()
     set_format(camera, "YUYV")
     with Feeder(output, fps=2) as feeder:
-        feeder.line()
+        feeder.shown()
         capture(camera, 60, to="/tmp/frames")
     shown = {luma_of(f"{number:06}.pgm"): number for number in range(48)}
     seen = [shown.get(frame[::2]) for frame in frames_of("/tmp/frames", 614400)]

@@ -22,7 +22,7 @@ def images():
 def run():
     camera, output = vivid_loop()
     with Feeder(output, fps=2) as feeder:
-        feeder.line()
+        feeder.shown()
         loopd.start({"camera.path": camera, "camera.format": "YUYV"})
         with Events() as events:
             events.frames(1)

@@ -9,23 +9,26 @@ from vm.events import Events
 from vm.programs import Feeder
 
 LAP = 24  # images
+IMAGES = 38
 
 
 def shown_at(times, time_ns):
-    """Number of the image that was shown at a time; times: [(time_ns, file name)]."""
-    names = [name for begin, name in times if begin <= time_ns]
-    return int(names[-1].partition(".")[0]) if names else None
+    """Number of the image that was shown at a time; times: [(time_ns, number)]."""
+    numbers = [number for begin, number in times if begin <= time_ns]
+    return numbers[-1] if numbers else None
 
 
 def run():
     camera, output = vivid_loop()
-    with Feeder(output, fps=1.5) as feeder:
-        first = feeder.line().split()
+    with Feeder(output) as feeder:
+        times = [feeder.shown()]
         loopd.start({"camera.path": camera, "camera.format": "YUYV"})
-        with Events(classes=("loop", "candidate", "state", "stats")) as events:
+        with Events() as events:
             events.state(("running", "camera_back"))
-            times = [(int(first[0]), first[1])] + feeder.wait(within_s=120)
-            events.frames(1)
+            for _ in range(IMAGES - 1):
+                events.frames(2)  # one may have been taken before the image was there
+                times.append(feeder.step())
+            events.frames(2)
             loops = events.loops()
     pairs = [(shown_at(times, loop["query"]["time_ns"]), shown_at(times, loop["match"]["time_ns"])) for loop in loops]
     good = [pair for pair in pairs if None not in pair and abs(pair[0] - pair[1] - LAP) <= 2]

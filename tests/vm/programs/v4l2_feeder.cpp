@@ -23,8 +23,9 @@ struct Options {
   std::string device;
   std::string format = "YUYV";
   double fps = 30;
-  int hold = 1;  ///< frames an image is shown for
-  int laps = 1;  ///< times through the folder
+  int hold = 1;        ///< frames an image is shown for
+  bool steps = false;  ///< the next image comes when a line is read from standard input
+  int laps = 1;        ///< times through the folder
 };
 
 std::size_t fill(const LumaImage& image, const std::string& format, std::span<std::uint8_t> to) {
@@ -75,6 +76,8 @@ Status feed(const Options& options) {
   std::int64_t next_ns = monotonic_now_ns();
   for (int lap = 0; lap < options.laps; ++lap) {
     for (std::size_t i = 0; i < images.size(); ++i) {
+      std::string line;
+      if (options.steps && !(lap == 0 && i == 0) && !std::getline(std::cin, line)) return Nothing{};
       std::cout << monotonic_now_ns() << " " << files.value()[i].filename().string() << std::endl;
       const Status shown = show(output.value(), images[i], options, next_ns);
       if (!shown) return shown;
@@ -95,6 +98,7 @@ int main(int argc, char** argv) {
   app.add_option("--hold", options.hold, "frames an image is shown for")
       ->check(CLI::Range(1, 1000000));
   app.add_option("--laps", options.laps, "times through the folder")->check(CLI::Range(1, 1000000));
+  app.add_flag("--steps", options.steps, "go to the next image at each line of standard input");
   CLI11_PARSE(app, argc, argv);
   const Status status = feed(options);
   if (status) return 0;

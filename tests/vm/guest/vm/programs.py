@@ -6,7 +6,7 @@ import select
 import subprocess
 import time
 
-from vm.basics import PROGRAMS, SEQUENCE, Failure, check, note, until
+from vm.basics import PROGRAMS, SEQUENCE, check, note, until
 
 
 class Program:
@@ -47,21 +47,22 @@ class Program:
 
 
 class Feeder(Program):
-    """Shows the two laps on a V4L2 output; `hold` frames an image."""
+    """Shows the two laps on a V4L2 output, at a rate or (fps=0) image by image as told by step()."""
 
-    def __init__(self, output, fps, hold=1, laps=1, fourcc="YUYV", folder=f"{SEQUENCE}/640x480/pgm"):
+    def __init__(self, output, fps=0, laps=1, fourcc="YUYV", folder=f"{SEQUENCE}/640x480/pgm"):
+        pace = ["--fps", str(fps)] if fps else ["--steps"]
         super().__init__(f"{PROGRAMS}/v4l2_feeder", folder, "--device", output, "--format", fourcc,
-                         "--fps", str(fps), "--hold", str(hold), "--laps", str(laps))
+                         "--laps", str(laps), *pace)
 
-    def wait(self, within_s):
-        """Waits until it has shown all. Returns [(time_ns, file name)]."""
-        try:
-            text, _ = self.process.communicate(timeout=within_s)
-        except subprocess.TimeoutExpired as late:
-            raise Failure(f"the feeder was not done within {within_s} s") from late
-        check(self.process.returncode == 0, f"the feeder failed with {self.process.returncode}")
-        lines = (self.printed + text).decode().splitlines()
-        return [(int(line.split()[0]), line.split()[1]) for line in lines]
+    def shown(self):
+        """The next image that was shown: (time_ns, number)."""
+        time_ns, name = self.line().split()
+        return int(time_ns), int(name.partition(".")[0])
+
+    def step(self):
+        """Shows the next image; returns (time_ns, number)."""
+        self.process.stdin.write(b"\n")
+        return self.shown()
 
 
 class UsbCamera(Program):
