@@ -18,7 +18,7 @@ SOCKET_FAMILIES = {"AF_INET": 2, "AF_INET6": 10, "AF_NETLINK": 16, "AF_PACKET": 
 
 def security():
     unit = f"loopd@{loopd.NAME}.service"
-    verify = sh("systemd-analyze", "verify", f"/lib/systemd/system/loopd@.service", may_fail=True)
+    verify = sh("systemd-analyze", "verify", "--man=no", "/lib/systemd/system/loopd@.service", may_fail=True)
     check(not verify.strip(), f"systemd-analyze verify says: {verify}")
     text = sh("systemd-analyze", "security", "--no-pager", unit)
     level = float(re.search(r"exposure level for \S+: ([0-9.]+)", text).group(1))

@@ -47,6 +47,12 @@ def refused_start(events, camera, fault):
     events.frames(2)
 
 
+def refused_buffer(events, camera):
+    """A buffer that the driver does not take once is given to it again: the stream goes on."""
+    control(camera, inject_vidioc_qbuf_error=1)
+    events.frames(8)  # more than there are buffers
+
+
 def disconnected(events, camera):
     """The device says that it is gone while its node stays, and udev is silent."""
     control(camera, disconnect=1)
@@ -69,7 +75,7 @@ def run():
         for fault in ("inject_vidioc_reqbufs_error", "inject_vidioc_streamon_error"):
             note(fault)
             refused_start(events, camera, fault)
-        named_loss(events, camera, "inject_vidioc_qbuf_error")
+        refused_buffer(events, camera)
         disconnected(events, camera)
         check(events.next("stats", 10)["epoch"] == events.epoch, "the epoch should be the same")
         loopd.check_no_growth(before, loopd.Footprint(loopd.main_pid()), rss_kib=4096)
