@@ -31,7 +31,7 @@ class LoopctlDaemonTest : public ::testing::Test {
   LoopctlDaemonTest() {
     testing::write_laps(images_, kPlaces);
     config_ = testing::small_config(images_.string());
-    config_.camera.fps = 20;
+    config_.camera.fps = 60;
     config_.camera.loop = true;
     config_.events.socket = (folder_ / "events.sock").string();
     config_.events.stats_interval_s = 0.05;
@@ -120,9 +120,9 @@ TEST_F(LoopctlDaemonTest, ReloadSaysWhatCameOfIt) {
 TEST_F(LoopctlDaemonTest, ARecordingIsAFileThatPlays) {
   start();
   const std::string file = (folder_ / "a.rec").string();
-  const LoopctlResult recorded = control({"record", file, "--seconds", "0.5"});
+  const LoopctlResult recorded = control({"record", file, "--max-mib", "1"});
   EXPECT_EQ(recorded.exit_code, 0) << recorded.err << recorded.out;
-  EXPECT_THAT(recorded.out, AllOf(HasSubstr("recording to"), HasSubstr("its time is over")));
+  EXPECT_THAT(recorded.out, AllOf(HasSubstr("recording to"), HasSubstr("as large as it may be")));
   daemon_.reset();
   config_.camera.path = file;
   config_.camera.fps = 0;

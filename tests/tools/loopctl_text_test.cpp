@@ -181,7 +181,9 @@ CameraList two_cameras() {
   yuyv.sizes = {{640, 480, {30, 15}}};
   V4l2Mode strange;
   strange.fourcc = 0x34363248;
-  list.v4l2[0].modes = {yuyv, strange};
+  V4l2Mode uyvy = yuyv;
+  uyvy.fourcc = 0x59565955;
+  list.v4l2[0].modes = {yuyv, uyvy, strange};
   list.v4l2[0].problem = "it is in use by process 7 (obs)";
   list.build = {true, "libcamera 0.0.3"};
   CameraListing sensor;
@@ -194,8 +196,8 @@ CameraList two_cameras() {
 TEST(Cameras, TextSaysHowEachIsChosenAndWhatIsInTheWay) {
   EXPECT_THAT(
       cameras_text(two_cameras()),
-      AllOf(HasSubstr("/dev/video0: Webcam\n"), HasSubstr("YUYV  640x480 (30, 15 fps)\n"),
-            HasSubstr("H264  (not read here)"), HasSubstr("in use by process 7 (obs)"),
+      AllOf(HasSubstr("/dev/video0: Webcam\n"), HasSubstr("YUYV, UYVY  640x480 (30, 15 fps)\n"),
+            HasSubstr("  unread    H264\n"), HasSubstr("in use by process 7 (obs)"),
             HasSubstr("      path = \"serial:SN1\"\n"), HasSubstr("/base/i2c/imx219@10: imx219\n"),
             HasSubstr("      path = \"/base/i2c/imx219@10\"\n")));
 }
@@ -205,7 +207,7 @@ TEST(Cameras, JsonHasTheSame) {
   ASSERT_EQ(json["cameras"].size(), 2u);
   EXPECT_EQ(json["cameras"][0]["path"], "serial:SN1");
   EXPECT_EQ(json["cameras"][0]["formats"][0]["sizes"][0]["fps"][1], 15);
-  EXPECT_EQ(json["cameras"][0]["formats"][1]["readable"], false);
+  EXPECT_EQ(json["cameras"][0]["formats"][2]["readable"], false);
   EXPECT_EQ(json["cameras"][1]["source"], "libcamera");
 }
 

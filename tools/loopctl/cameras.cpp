@@ -1,6 +1,7 @@
 #include "loopctl/cameras.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "app/parameter_text.h"
 
@@ -49,13 +50,36 @@ std::string choice(const std::string& source, const std::string& path) {
 
 bool is_readable(const V4l2Mode& mode) { return mode.format.has_value(); }
 
+/// "YUYV", without the blank that pads a short code.
+std::string code_text(const V4l2Mode& mode) {
+  std::string code = fourcc_text(mode.fourcc);
+  code.erase(code.find_last_not_of(' ') + 1);
+  return code;
+}
+
+/// Sizes and rates: what mode_text() tells beside the code.
+std::string sizes_text(const V4l2Mode& mode) {
+  return mode_text(mode).substr(fourcc_text(mode.fourcc).size());
+}
+
+/// Formats of the same sizes and rates share a line; those that cannot be read are only named.
 std::string modes_text(const std::vector<V4l2Mode>& modes) {
+  std::vector<std::pair<std::string, std::string>> lines;  // codes, and their sizes
+  std::string unreadable;
+  for (const V4l2Mode& mode : modes) {
+    if (!is_readable(mode)) {
+      unreadable += (unreadable.empty() ? "" : ", ") + code_text(mode);
+    } else if (!lines.empty() && lines.back().second == sizes_text(mode)) {
+      lines.back().first += ", " + code_text(mode);
+    } else {
+      lines.emplace_back(code_text(mode), sizes_text(mode));
+    }
+  }
   std::string text;
-  for (const V4l2Mode& mode : modes)
-    text += row(text.empty() ? "formats" : "",
-                mode_text(mode) + (is_readable(mode) ? "" : "  (not read here)"));
-  if (!modes.empty() && std::ranges::none_of(modes, is_readable))
-    text += row("", "none of them can be read here");
+  for (const auto& [codes, sizes] : lines)
+    text += row(text.empty() ? "formats" : "", codes + sizes);
+  if (lines.empty() && !modes.empty()) text += row("formats", "none that can be read here");
+  if (!unreadable.empty()) text += row("unread", unreadable);
   return text;
 }
 

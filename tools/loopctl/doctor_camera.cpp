@@ -69,7 +69,10 @@ std::vector<V4l2Mode> usable_modes(const CameraConfig& camera, const std::vector
 
 std::string format_names(const std::vector<V4l2Mode>& modes) {
   std::string text;
-  for (const V4l2Mode& mode : modes) text += (text.empty() ? "" : ", ") + fourcc_text(mode.fourcc);
+  for (const V4l2Mode& mode : modes) {
+    text += (text.empty() ? "" : ", ") + fourcc_text(mode.fourcc);
+    text.erase(text.find_last_not_of(' ') + 1);  // the padding of short codes
+  }
   return text;
 }
 
