@@ -1,4 +1,4 @@
-# Two Debian packages: loopd (what a robot needs) and loopd-tools (evaluation, videos);
+# Debian packages: loopd (what a robot needs), loopd-libcamera and loopd-tools (evaluation, videos);
 # `tools/package` builds them.
 
 set(CPACK_GENERATOR DEB)
@@ -7,7 +7,7 @@ set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_PACKAGE_CONTACT "loopd developers <loopd@loopd.invalid>")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL daemon tools)
+set(CPACK_COMPONENTS_ALL daemon libcamera tools)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
   OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 
@@ -24,12 +24,21 @@ set(CPACK_DEBIAN_DAEMON_DESCRIPTION
 place that it has seen before, with the geometry between the two views. Uses
 points and lines, needs no training, and runs as a hardened systemd service.")
 set(CPACK_DEBIAN_DAEMON_PACKAGE_DEPENDS "systemd (>= 252), passwd, kmod")
-set(CPACK_DEBIAN_DAEMON_PACKAGE_SUGGESTS "loopd-tools")
+set(CPACK_DEBIAN_DAEMON_PACKAGE_SUGGESTS "loopd-libcamera, loopd-tools")
 set(CPACK_DEBIAN_DAEMON_PACKAGE_CONTROL_EXTRA
   ${CMAKE_SOURCE_DIR}/packaging/conffiles
   ${CMAKE_SOURCE_DIR}/packaging/postinst
   ${CMAKE_SOURCE_DIR}/packaging/prerm
   ${CMAKE_SOURCE_DIR}/packaging/postrm)
+
+set(CPACK_DEBIAN_LIBCAMERA_PACKAGE_NAME loopd-libcamera)
+set(CPACK_DEBIAN_LIBCAMERA_PACKAGE_SECTION video)
+set(CPACK_DEBIAN_LIBCAMERA_DESCRIPTION
+"Lets loopd use the cameras that libcamera drives: sensors behind the image
+processor of a small computer, beside the cameras of the kernel's V4L2 that
+loopd uses by itself.")
+set(CPACK_DEBIAN_LIBCAMERA_PACKAGE_DEPENDS "loopd (= ${PROJECT_VERSION})")
+set(CPACK_DEBIAN_LIBCAMERA_PACKAGE_RECOMMENDS "libcamera-ipa")
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME loopd-tools)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION video)
@@ -56,6 +65,7 @@ file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/changelog CONTENT
 " @ONLY)
 execute_process(COMMAND ${GZIP} -9nkf ${CMAKE_BINARY_DIR}/changelog COMMAND_ERROR_IS_FATAL ANY)
 loopd_package_docs(daemon loopd)
+loopd_package_docs(libcamera loopd-libcamera)
 loopd_package_docs(tools loopd-tools)
 
 # loopd_install_man(COMPONENT PAGES...): manual pages, compressed as Debian wants them.

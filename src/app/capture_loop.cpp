@@ -59,9 +59,14 @@ bool CaptureLoop::handle(const CameraError& error) {
 }
 
 bool CaptureLoop::handle(const CameraNotice& notice) {
+  // A camera that comes and goes says the same each time.
+  const std::int64_t now_ns = monotonic_now_ns();
+  Noticed& before = noticed_.at(static_cast<std::size_t>(notice.kind));
+  if (before.message == notice.message && now_ns - before.time_ns < kLogInterval_ns) return true;
+  before = {notice.message, now_ns};
   const LogLevel level =
       notice.kind == CameraNotice::Kind::kOpened ? LogLevel::kInfo : LogLevel::kWarning;
-  tell({level, {State::kRunning, monotonic_now_ns(), notice.message, ""}, Notice::Kind::kCamera});
+  tell({level, {State::kRunning, now_ns, notice.message, ""}, Notice::Kind::kCamera});
   return true;
 }
 

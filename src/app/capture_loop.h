@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "app/notices.h"
 #include "app/wakeup.h"
@@ -44,6 +45,15 @@ class CaptureLoop {
  private:
   static constexpr std::size_t kFaults = static_cast<std::size_t>(CameraFault::kStreamError) + 1;
 
+  static constexpr std::size_t kNotices =
+      static_cast<std::size_t>(CameraNotice::Kind::kSettings) + 1;
+
+  /// A notice that was logged, and when.
+  struct Noticed {
+    std::string message;
+    std::int64_t time_ns = 0;
+  };
+
   bool handle(Frame frame);
   bool handle(const CameraError& error);
   bool handle(EndOfStream);
@@ -60,8 +70,9 @@ class CaptureLoop {
   const Wakeup& wakeup_;
   CaptureCounters& counters_;
   const bool lock_step_;
-  std::optional<State> state_;                                  ///< the last one told
-  std::optional<CameraFault> fault_;                            ///< and its cause, if it has one
+  std::optional<State> state_;        ///< the last one told
+  std::optional<CameraFault> fault_;  ///< and its cause, if it has one
+  std::array<Noticed, kNotices> noticed_{};
   std::array<std::optional<std::int64_t>, kFaults> told_ns_{};  ///< when each fault was last logged
 };
 

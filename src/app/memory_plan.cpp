@@ -1,6 +1,8 @@
 #include "app/memory_plan.h"
 
 #include "app/report_queue.h"
+#include "capture/recording_writer.h"
+#include "events/control_server.h"
 #include "loopd/features.h"
 
 namespace loopd {
@@ -24,8 +26,12 @@ MemoryPlan memory_plan(const DaemonConfig& config) {
   plan.frame_buffers = static_cast<std::size_t>(config.camera.buffers) *
                        static_cast<std::size_t>(config.camera.max_pixels);
   plan.reports = ReportQueue::bytes(static_cast<std::size_t>(config.events.report_queue));
+  const ControlOptions control;
   plan.client_queues = static_cast<std::size_t>(config.events.max_clients) *
                        static_cast<std::size_t>(config.events.client_queue_kib) * 1024;
+  plan.control_queues = static_cast<std::size_t>(control.max_clients) * control.client_queue_bytes;
+  plan.history = static_cast<std::size_t>(config.events.history_kib) * 1024;
+  plan.recording = RecordingOptions().buffer_bytes;
   plan.image_features =
       points * (sizeof(Point) + sizeof(Descriptor)) + lines * (sizeof(Line) + sizeof(Descriptor));
   plan.image_words = (points + lines) * kBytesPerWord;
@@ -36,7 +42,9 @@ std::string memory_text(const MemoryPlan& plan) {
   constexpr std::size_t kImages = 1000;
   return "# memory, fixed:          " + mib_text(plan.fixed()) + "\n#   frame buffers         " +
          mib_text(plan.frame_buffers) + "\n#   reports               " + mib_text(plan.reports) +
-         "\n#   client queues, full   " + mib_text(plan.client_queues) +
+         "\n#   client queues, full   " + mib_text(plan.client_queues + plan.control_queues) +
+         "\n#   history               " + mib_text(plan.history) +
+         "\n# memory, recording:      " + mib_text(plan.recording) +
          "\n# memory, 1000 images:    " + mib_text(kImages * plan.per_image()) + " at most" +
          "\n#   features              " + mib_text(kImages * plan.image_features) +
          "\n#   words, all new        " + mib_text(kImages * plan.image_words) + "\n";

@@ -12,6 +12,7 @@
 #include "capture/libcamera_device.h"
 #include "capture/libcamera_error.h"
 #include "capture/libcamera_manager.h"
+#include "capture/libcamera_plugin.h"
 #include "capture/libcamera_selection.h"
 
 namespace loopd {
@@ -118,17 +119,13 @@ CameraListing listing_of(const LibcameraManager& manager, libcamera::Camera& cam
   return listing;
 }
 
-}  // namespace
+LibcameraBuild build() { return {true, "libcamera " + libcamera::CameraManager::version()}; }
 
-LibcameraBuild libcamera_build() {
-  return {true, "libcamera " + libcamera::CameraManager::version()};
-}
-
-std::unique_ptr<CaptureDriver> make_libcamera_driver(const LibcameraOptions& options) {
+std::unique_ptr<CaptureDriver> make_driver(const LibcameraOptions& options) {
   return std::make_unique<LibcameraDriver>(options);
 }
 
-Result<std::vector<CameraListing>> list_libcamera_cameras() {
+Result<std::vector<CameraListing>> list() {
   auto manager = LibcameraManager::start();
   if (!manager) return manager.error();
   std::vector<CameraListing> listings;
@@ -137,4 +134,11 @@ Result<std::vector<CameraListing>> list_libcamera_cameras() {
   return listings;
 }
 
+}  // namespace
 }  // namespace loopd
+
+[[gnu::visibility("default")]] const loopd::LibcameraPlugin* loopd_libcamera_plugin() {
+  static constexpr loopd::LibcameraPlugin kPlugin{loopd::libcamera_plugin_made_for(), &loopd::build,
+                                                  &loopd::make_driver, &loopd::list};
+  return &kPlugin;
+}

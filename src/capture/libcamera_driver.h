@@ -28,7 +28,8 @@ struct LibcameraOptions {
   int buffers = 0;  ///< 0: what the pipeline proposes, at least 4; else 2 to 32
 };
 
-/// Whether this build has libcamera, and which: "libcamera 0.0.3", or why not.
+/// Whether loopd-libcamera.so is there, and its libcamera: "libcamera v0.0.3", or why not. Loads
+/// it.
 struct LibcameraBuild {
   bool present = false;
   std::string text;
@@ -44,7 +45,8 @@ LibcameraBuild libcamera_build();
 /// open() takes the same again: another one only if that appeared since and is what `camera` names.
 ///
 /// libcamera's own log is off unless LIBCAMERA_LOG_LEVELS or LIBCAMERA_LOG_FILE is set.
-/// In a build without libcamera every open() is the error "this build has no libcamera; ...".
+/// libcamera itself is loaded by the first open(), in its thread (libcamera_plugin.h); where it is
+/// not installed every open() is the error "this loopd has no libcamera; ...".
 std::unique_ptr<CaptureDriver> make_libcamera_driver(const LibcameraOptions& options);
 
 /// The cameras libcamera sees now, told as V4L2's are: `node` is libcamera's id (for camera.path),

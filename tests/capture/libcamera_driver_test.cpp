@@ -29,7 +29,7 @@ TEST(LibcameraDriver, ACameraThatIsNotThereIsNamedAgainAndAgain) {
           << error->message;
     } else {
       EXPECT_EQ(error->fault, CameraFault::kUnsupported);
-      EXPECT_EQ(error->message.rfind("this build has no libcamera; ", 0), 0U) << error->message;
+      EXPECT_EQ(error->message.rfind("this loopd has no libcamera; ", 0), 0U) << error->message;
     }
   }
 }
@@ -46,7 +46,7 @@ TEST(LibcameraDriver, ListsWhatThereIsOrSaysWhyNot) {
 
 TEST(LibcameraDriver, TellsOfItsBuild) {
   const LibcameraBuild build = libcamera_build();
-  EXPECT_EQ(build.text.rfind(build.present ? "libcamera v" : "this build has no libcamera", 0), 0U)
+  EXPECT_EQ(build.text.rfind(build.present ? "libcamera v" : "this loopd has no libcamera", 0), 0U)
       << build.text;
 }
 
