@@ -2,8 +2,6 @@
 TIMEOUT_S = 240
 SMOKE = False
 
-import os
-
 from vm import loopd
 from vm.basics import Skip, check, note, sh
 from vm.drivers import load
@@ -20,6 +18,7 @@ def run():
     with Events() as events:
         stats = events.frames(5, within_s=90)
         note(f"{stats}")
-        pid = loopd.main_pid()
-        for task in os.listdir(f"/proc/{pid}/task"):
-            check(os.sched_getaffinity(int(task)) == {0}, f"task {task} may run on {os.sched_getaffinity(int(task))}")
+        found = loopd.tasks(loopd.main_pid())
+        note(f"tasks: {found}")
+        wrong = {name: task for name, task in found.items() if task[0] != {0}}
+        check(not wrong, f"tasks outside the configured CPUs (CPUs, policy, priority): {wrong}")

@@ -14,7 +14,6 @@ def run():
         loopd.start({"camera.path": camera, "camera.format": fourcc})
         with Events() as events:
             stats = events.frames(5)
-            events.state(("running", "camera_back"))
             got = v4l2(camera, "--get-fmt-video")
             check(f"'{fourcc}'" in got, f"{fourcc} was wished and the driver does {got}")
             check(stats["corrupt"] == 0, f"{stats['corrupt']} frames of {fourcc} were corrupt")

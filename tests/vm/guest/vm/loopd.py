@@ -94,6 +94,16 @@ def loopctl(*words, name=NAME, within_s=30, may_fail=False):
     return sh("loopctl", *words, "--camera", name, within_s=within_s, may_fail=may_fail)
 
 
+def tasks(pid):
+    """Every thread of a process: {"name number": (CPUs it may run on, policy, real-time priority)}."""
+    found = {}
+    for task in os.listdir(f"/proc/{pid}/task"):
+        number, name = int(task), read(f"/proc/{pid}/task/{task}/comm").strip()
+        found[f"{name} {task}"] = (os.sched_getaffinity(number), os.sched_getscheduler(number),
+                                   os.sched_getparam(number).sched_priority)
+    return found
+
+
 class Footprint:
     """Descriptors, threads and memory of a process."""
 
