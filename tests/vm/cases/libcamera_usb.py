@@ -12,6 +12,7 @@ from vm.drivers import load
 from vm.events import Events
 from vm.programs import UsbCamera
 
+PLAIN_SYSFS = "/run/vm-sysfs"  # what is written below the overlay would stay in it
 HOST = "/sys/devices/platform/vhci_hcd.0"
 
 
@@ -28,7 +29,9 @@ def give_firmware_path():
 def run():
     load("vhci-hcd")
     loopd.install()
-    with UsbCamera(fps=10) as usb:
+    os.makedirs(PLAIN_SYSFS)
+    sh("mount", "-t", "sysfs", "sysfs", PLAIN_SYSFS)
+    with UsbCamera(fps=10, sysfs=PLAIN_SYSFS) as usb:
         usb.plug()
         give_firmware_path()
         loopd.drop_in("[Service]\nEnvironment=SYSTEMD_DEVICE_VERIFY_SYSFS=0\n")

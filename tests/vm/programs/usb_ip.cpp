@@ -12,7 +12,7 @@
 namespace loopd::vm {
 namespace {
 
-constexpr const char* kAttach = "/sys/devices/platform/vhci_hcd.0/attach";
+constexpr const char* kAttach = "/devices/platform/vhci_hcd.0/attach";
 constexpr unsigned kDeviceId = 0x10001;  // bus 1, device 1
 constexpr unsigned kHighSpeed = 3;
 constexpr std::size_t kHeaderBytes = 48;
@@ -51,7 +51,7 @@ Status write_all(int fd, std::span<const std::uint8_t> bytes) {
 
 }  // namespace
 
-Result<UsbIpPort> UsbIpPort::attach(unsigned port) {
+Result<UsbIpPort> UsbIpPort::attach(unsigned port, const std::string& sysfs) {
   int ends[2];
   if (socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
     return errno_error("cannot make a socket pair", errno);
@@ -59,7 +59,7 @@ Result<UsbIpPort> UsbIpPort::attach(unsigned port) {
   UniqueFd ours(ends[0]);
   const UniqueFd kernels(ends[1]);
   setsockopt(ours.get(), SOL_SOCKET, SO_SNDBUF, &kSocketBytes, sizeof kSocketBytes);
-  const UniqueFd attach(open(kAttach, O_WRONLY | O_CLOEXEC));
+  const UniqueFd attach(open((sysfs + kAttach).c_str(), O_WRONLY | O_CLOEXEC));
   if (!attach.valid()) return errno_error("cannot attach: is vhci-hcd loaded?", errno);
   const std::string line = std::to_string(port) + " " + std::to_string(kernels.get()) + " " +
                            std::to_string(kDeviceId) + " " + std::to_string(kHighSpeed);

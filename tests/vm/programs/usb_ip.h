@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -38,9 +39,10 @@ class UsbIpPort {
  public:
   using Request = std::variant<Submit, Unlink, Detached>;
 
-  /// Plugs a device into `port` (0..7). Errors: vhci-hcd is not loaded, or the port is not free
-  /// (also for some milliseconds after a device there was pulled out).
-  static Result<UsbIpPort> attach(unsigned port);
+  /// Plugs a device into `port` (0..7) of the kernel whose sysfs is mounted there. Errors: vhci-hcd
+  /// is not loaded, or the port is not free (also for some milliseconds after a device there was
+  /// pulled out).
+  static Result<UsbIpPort> attach(unsigned port, const std::string& sysfs);
 
   int fd() const { return socket_.get(); }
 

@@ -110,9 +110,10 @@ Result<std::vector<FrameSize>> parse_sizes(const std::string& text) {
 /// The camera, plugged in or not, and its clock.
 class Bench {
  public:
-  Bench(UvcModel model, fs::path folder)
+  Bench(UvcModel model, fs::path folder, std::string sysfs)
       : model_(std::move(model)),
         show_(std::move(folder)),
+        sysfs_(std::move(sysfs)),
         timer_(timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK)) {}
 
   /// Until standard input ends.
@@ -188,7 +189,7 @@ class Bench {
 
   Status plug() {
     if (camera_) return Error{"it is plugged in"};
-    auto port = UsbIpPort::attach(0);
+    auto port = UsbIpPort::attach(0, sysfs_);
     if (!port) return port.error();
     camera_.emplace(model_, std::move(port).value());
     return Nothing{};
@@ -260,6 +261,7 @@ class Bench {
 
   UvcModel model_;
   Show show_;
+  const std::string sysfs_;
   UniqueFd timer_;
   std::optional<UvcCamera> camera_;
   std::int64_t interval_ns_ = 0;
@@ -275,18 +277,20 @@ int main(int argc, char** argv) {
   CLI::App app("A USB camera for the kernel's uvcvideo, by way of vhci-hcd.");
   std::string folder;
   std::string sizes = "640x480,320x240";
+  std::string sysfs = "/sys";
   UvcModel model;
   app.add_option("FOLDER", folder, "with WIDTHxHEIGHT/jpeg and WIDTHxHEIGHT/pgm")->required();
   app.add_option("--sizes", sizes, "sizes of both formats");
   app.add_option("--fps", model.fps, "frames a second")->check(CLI::Range(1.0, 240.0));
   app.add_option("--serial", model.serial);
   app.add_option("--product", model.product);
+  app.add_option("--sysfs", sysfs, "where sysfs is mounted");
   CLI11_PARSE(app, argc, argv);
   auto parsed = parse_sizes(sizes);
   Status status = Nothing{};
   if (parsed) {
     model.sizes = std::move(parsed).value();
-    status = Bench(model, folder).run();
+    status = Bench(model, folder, sysfs).run();
   } else {
     status = parsed.error();
   }

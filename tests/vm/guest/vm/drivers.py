@@ -65,7 +65,8 @@ def bind_vivid():
 
 def loopback():
     """A v4l2loopback device: what is written into it is what a reader gets."""
-    load("v4l2loopback", devices=1, exclusive_caps=0)
+    # Two buffers, its default, are written while they are being read.
+    load("v4l2loopback", devices=1, exclusive_caps=0, max_buffers=8)
     return node_of("v4l2 loopback", "any")
 
 

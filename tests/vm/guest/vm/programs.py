@@ -68,9 +68,9 @@ class Feeder(Program):
 class UsbCamera(Program):
     """A UVC camera on a USB port of vhci-hcd, which must be loaded. It does what it is told."""
 
-    def __init__(self, fps=30, serial="SN0001", sizes="640x480,320x240"):
+    def __init__(self, fps=30, serial="SN0001", sizes="640x480,320x240", sysfs="/sys"):
         super().__init__(f"{PROGRAMS}/virtual_uvc_camera", SEQUENCE, "--fps", str(fps), "--serial", serial,
-                         "--sizes", sizes)
+                         "--sizes", sizes, "--sysfs", sysfs)
         self.serial = serial
 
     def tell(self, *words):
