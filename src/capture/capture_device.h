@@ -35,6 +35,15 @@ std::string_view pixel_format_name(PixelFormat format);
 /// The padding of "Y10 " may be left out. None for any other name.
 std::optional<PixelFormat> pixel_format_from_name(std::string_view name);
 
+/// Rank of the work that makes luma of it, 0 the least: a copy of rows (and how much the bus
+/// carries beside them), every second byte, every second of wider words, three products a pixel, a
+/// decoder.
+int luma_cost(PixelFormat format);
+
+/// The value of least, least + step, ... most that is nearest to `wish`: how drivers offer sizes.
+/// Precondition: least <= most, step >= 1.
+int nearest_in_steps(int wish, int least, int most, int step);
+
 /// One frame as the driver gave it. The memory is the driver's until CaptureDevice::release().
 struct RawFrame {
   PixelFormat format = PixelFormat::kGrey;

@@ -39,41 +39,9 @@ constexpr std::array<Known, 22> kKnown{{
     {fourcc('M', 'J', 'P', 'G'), PixelFormat::kMjpeg},
 }};
 
-// Relative cost of the way to luma: a copy of rows, every second byte, three products a pixel, or
-// an entropy decoder.
-int cost(PixelFormat format) {
-  switch (format) {
-    case PixelFormat::kGrey:
-      return 0;
-    case PixelFormat::kNv12:
-    case PixelFormat::kYu12:
-      return 1;  // as GREY, but the camera fills and the bus carries half as much again
-    case PixelFormat::kYuyv:
-    case PixelFormat::kUyvy:
-      return 2;
-    case PixelFormat::kY10:
-    case PixelFormat::kY16:
-      return 3;
-    case PixelFormat::kRgb24:
-    case PixelFormat::kBgr24:
-      return 4;
-    case PixelFormat::kMjpeg:
-      return 5;
-  }
-  return std::numeric_limits<int>::max();
-}
-
 std::int64_t distance(FrameSize a, FrameSize b) {
   return std::abs(std::int64_t{a.width_px} - b.width_px) +
          std::abs(std::int64_t{a.height_px} - b.height_px);
-}
-
-// The value of smallest, smallest + step, ... largest that is nearest to `wanted`.
-int nearest_step(int wanted, int smallest, int largest, int step) {
-  if (wanted <= smallest) return smallest;
-  const int count = (std::min(wanted, largest) - smallest + step / 2) / step;
-  const int rounded = smallest + count * step;
-  return rounded > largest ? rounded - step : rounded;
 }
 
 std::optional<FrameSize> nearest_in_range(const FormatOffer& offer, FrameSize wanted) {
@@ -81,10 +49,10 @@ std::optional<FrameSize> nearest_in_range(const FormatOffer& offer, FrameSize wa
   if (offer.smallest.width_px <= 0 || offer.largest.width_px < offer.smallest.width_px ||
       offer.smallest.height_px <= 0 || offer.largest.height_px < offer.smallest.height_px)
     return std::nullopt;
-  return FrameSize{nearest_step(wanted.width_px, offer.smallest.width_px, offer.largest.width_px,
-                                offer.step.width_px),
-                   nearest_step(wanted.height_px, offer.smallest.height_px, offer.largest.height_px,
-                                offer.step.height_px)};
+  return FrameSize{nearest_in_steps(wanted.width_px, offer.smallest.width_px,
+                                    offer.largest.width_px, offer.step.width_px),
+                   nearest_in_steps(wanted.height_px, offer.smallest.height_px,
+                                    offer.largest.height_px, offer.step.height_px)};
 }
 
 FrameSize nearest_size(const FormatOffer& offer, FrameSize wanted) {
@@ -111,7 +79,7 @@ std::optional<FormatChoice> choose_format(std::span<const FormatOffer> offers,
     if (!format || (only && *format != *only)) continue;
     const FormatChoice next{i, *format, nearest_size(offers[i], wanted)};
     const auto rank = [&](const FormatChoice& choice) {
-      return std::tuple(distance(choice.size, wanted), cost(choice.format));
+      return std::tuple(distance(choice.size, wanted), luma_cost(choice.format));
     };
     if (!best || rank(next) < rank(*best)) best = next;
   }

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -38,6 +39,34 @@ std::optional<PixelFormat> pixel_format_from_name(std::string_view name) {
   for (const auto& [format, candidate] : kNames)
     if (without_padding(candidate) == without_padding(name)) return format;
   return std::nullopt;
+}
+
+int luma_cost(PixelFormat format) {
+  switch (format) {
+    case PixelFormat::kGrey:
+      return 0;
+    case PixelFormat::kNv12:
+    case PixelFormat::kYu12:
+      return 1;
+    case PixelFormat::kYuyv:
+    case PixelFormat::kUyvy:
+      return 2;
+    case PixelFormat::kY10:
+    case PixelFormat::kY16:
+      return 3;
+    case PixelFormat::kRgb24:
+    case PixelFormat::kBgr24:
+      return 4;
+    case PixelFormat::kMjpeg:
+      break;
+  }
+  return 5;
+}
+
+int nearest_in_steps(int wish, int least, int most, int step) {
+  const int clamped = std::clamp(wish, least, most);
+  const int below = least + (clamped - least) / step * step;
+  return clamped - below > step / 2 && most - below >= step ? below + step : below;
 }
 
 }  // namespace loopd

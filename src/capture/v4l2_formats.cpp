@@ -34,29 +34,6 @@ constexpr std::array<std::pair<std::uint32_t, PixelFormat>, 19> kReadable{{
     {V4L2_PIX_FMT_JPEG, PixelFormat::kMjpeg},
 }};
 
-// Work to make luma, least first.
-int luma_cost(PixelFormat format) {
-  switch (format) {
-    case PixelFormat::kGrey:
-      return 0;
-    case PixelFormat::kNv12:
-    case PixelFormat::kYu12:
-      return 1;
-    case PixelFormat::kYuyv:
-    case PixelFormat::kUyvy:
-      return 2;
-    case PixelFormat::kY10:
-    case PixelFormat::kY16:
-      return 3;
-    case PixelFormat::kRgb24:
-    case PixelFormat::kBgr24:
-      return 4;
-    case PixelFormat::kMjpeg:
-      break;
-  }
-  return 5;
-}
-
 int side_px(std::uint32_t side) { return static_cast<int>(std::min(side, kMaxSide_px)); }
 
 void add_rate(std::vector<double>& rates, const v4l2_fract& interval) {
@@ -90,12 +67,6 @@ void list_sizes(const V4l2Node& node, V4l2Mode& mode) {
     if (width_px < 1 || height_px < 1) continue;
     mode.sizes.push_back({width_px, height_px, list_rates(node, mode.fourcc, width_px, height_px)});
   }
-}
-
-int nearest_in_steps(int wish, int least, int most, int step) {
-  const int clamped = std::clamp(wish, least, most);
-  const int below = least + (clamped - least) / step * step;
-  return clamped - below > step / 2 && below + step <= most ? below + step : below;
 }
 
 long distance(const V4l2Size& size, const V4l2Wish& wish) {
