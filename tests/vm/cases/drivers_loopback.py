@@ -24,9 +24,9 @@ def check_order(frames, luma_step):
 
 
 def run():
-    device = loopback()
+    device = loopback()  # it overwrites what a reader is slow to take: a slow feeder leaves emulation time
     for fourcc, size in SIZES.items():
-        with Feeder(device, fps=8, laps=100, fourcc=fourcc) as feeder:
+        with Feeder(device, fps=3, laps=100, fourcc=fourcc) as feeder:
             feeder.shown()
             capture(device, 30, to="/tmp/frames")
         with open("/tmp/frames", "rb") as file:
