@@ -52,7 +52,9 @@ class Watch {
   Error one_connection() {
     Result<EventClient> client = EventClient::connect(options_.socket_path);
     if (!client) return client.error();
-    if (Status sent = client->watch(options_.request); !sent) return sent.error();
+    WatchRequest request = options_.request;
+    request.since = since_;
+    if (Status sent = client->watch(request); !sent) return sent.error();
     last_complaint_.clear();
     ended_in_order_ = false;
     while (!done_) {
@@ -82,12 +84,25 @@ class Watch {
 
   void account(const Json& record) {
     const std::string record_class = class_of(record);
+    remember_position(record, record_class);
     if (record_class == "state") {
       ended_in_order_ = text_of(record, "state") == state_name(State::kShuttingDown);
     }
     if (record_class != "loop") return;
     ++loops_;
     if (options_.count && loops_ >= *options_.count) done_ = true;
+  }
+
+  /// Where to go on after a connection that breaks: after the newest record that was watched, and
+  /// before the first of them where the daemon stood when it was asked.
+  void remember_position(const Json& record, const std::string& record_class) {
+    const Json& seq = member(record, "seq");
+    if (!seq.is_number_unsigned()) return;
+    const auto watched = record_class_from_name(record_class);
+    const bool seen =
+        watched && options_.request.classes.has(*watched) && member(record, "repeat") != true;
+    if (!seen && (record_class != "watch" || since_)) return;
+    since_ = Since{text_of(record, "epoch"), seq.get<std::uint64_t>()};
   }
 
   /// Says why, once for each reason: with --retry the same one comes four times a second.
@@ -111,6 +126,7 @@ class Watch {
   bool stopped_ = false;         ///< by a signal: what was asked for is what came
   bool ended_in_order_ = false;  ///< the daemon has said that it shuts down
   std::uint64_t loops_ = 0;
+  std::optional<Since> since_;
   std::string last_complaint_;
 };
 
