@@ -2,6 +2,7 @@
 TIMEOUT_S = 1500
 SMOKE = False
 
+import os
 import time
 
 from vm import loopd
@@ -10,7 +11,7 @@ from vm.drivers import load
 from vm.events import Events
 from vm.programs import UsbCamera
 
-TIMES = 100
+TIMES = int(os.environ.get("LOOPD_VM_REPLUGS", "100"))
 
 
 def replug(usb, events):
