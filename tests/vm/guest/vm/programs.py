@@ -113,5 +113,10 @@ class UsbCamera(Program):
 
 def usb_links():
     """Stable names of the USB cameras there are: {link: device}."""
-    links = glob.glob("/dev/v4l/by-id/*Virtual_Camera*-index0")
-    return {os.path.basename(link): os.path.realpath(link) for link in links}
+    found = {}
+    for link in glob.glob("/dev/v4l/by-id/*Virtual_Camera*-index0"):
+        try:
+            found[os.path.basename(link)] = os.path.realpath(link)
+        except FileNotFoundError:  # it went between the two looks
+            pass
+    return found
