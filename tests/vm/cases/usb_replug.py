@@ -28,6 +28,7 @@ def replug(usb, events):
 def run():
     load("vhci-hcd")
     with UsbCamera(fps=15) as usb:
+        usb.tell("show", 0)  # one view: the map, and the memory for it, stays as it is
         device = usb.plug()
         loopd.start({"camera.path": device, "camera.format": "MJPG", "camera.width": 320, "camera.height": 240})
         with Events() as events:
