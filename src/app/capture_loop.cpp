@@ -12,6 +12,8 @@ namespace {
 /// One bad frame after another fills no log: each kind of fault is logged this often at most.
 constexpr std::int64_t kLogInterval_ns = 10'000'000'000;
 
+constexpr std::int64_t kNewNodePatience_ns = 1'000'000'000;
+
 State state_of(const CameraError& error) {
   return error.fault == CameraFault::kStalled ? State::kCameraStalled : State::kCameraLost;
 }
@@ -89,12 +91,19 @@ void CaptureLoop::camera_away(const CameraError& error) {
 }
 
 /// Not every answer of a camera that is away: only another state or another cause. That a camera
-/// just unplugged is not there is no other cause.
-bool CaptureLoop::is_news(const CameraError& error) const {
+/// just unplugged is not there is no other cause, nor that a node just made is not yet ours: udev
+/// gives it to its group a moment later.
+bool CaptureLoop::is_news(const CameraError& error) {
+  const bool was_gone = fault_ == CameraFault::kUnplugged || fault_ == CameraFault::kNoDevice;
+  if (error.fault != CameraFault::kPermission) denied_since_ns_.reset();
   if (state_ != state_of(error)) return true;
-  const bool still_unplugged =
-      fault_ == CameraFault::kUnplugged && error.fault == CameraFault::kNoDevice;
-  return fault_ != error.fault && !still_unplugged;
+  if (was_gone && error.fault == CameraFault::kNoDevice) return false;
+  if (was_gone && error.fault == CameraFault::kPermission) {
+    const std::int64_t now_ns = monotonic_now_ns();
+    if (!denied_since_ns_) denied_since_ns_ = now_ns;
+    return now_ns - *denied_since_ns_ >= kNewNodePatience_ns;
+  }
+  return fault_ != error.fault;
 }
 
 void CaptureLoop::frame_lost(const CameraError& error) {

@@ -60,7 +60,7 @@ class CaptureLoop {
   bool handle(const CameraNotice& notice);
   bool handle(Interrupted) { return false; }
   void camera_away(const CameraError& error);
-  bool is_news(const CameraError& error) const;
+  bool is_news(const CameraError& error);
   void frame_lost(const CameraError& error);
   void tell(const Notice& notice);
 
@@ -70,8 +70,9 @@ class CaptureLoop {
   const Wakeup& wakeup_;
   CaptureCounters& counters_;
   const bool lock_step_;
-  std::optional<State> state_;        ///< the last one told
-  std::optional<CameraFault> fault_;  ///< and its cause, if it has one
+  std::optional<State> state_;                   ///< the last one told
+  std::optional<CameraFault> fault_;             ///< and its cause, if it has one
+  std::optional<std::int64_t> denied_since_ns_;  ///< of a node that has just come
   std::array<Noticed, kNotices> noticed_{};
   std::array<std::optional<std::int64_t>, kFaults> told_ns_{};  ///< when each fault was last logged
 };

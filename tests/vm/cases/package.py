@@ -30,7 +30,7 @@ def upgrade():
     with open("/etc/loopd/front.toml", "w") as file:
         file.write(mine)
     pid = loopd.main_pid()
-    sh("dpkg", "--force-confold", "-i", loopd.PACKAGE, within_s=120)
+    sh("dpkg", "--force-confold", "-i", *loopd.PACKAGES, within_s=120)
     check(read("/etc/loopd/front.toml") == mine, "an upgrade should keep the config")
     loopd.restarted(pid)
     with Events(within_s=60) as events:
@@ -39,7 +39,7 @@ def upgrade():
 
 def run():
     if os.path.exists("/usr/bin/loopd"):
-        sh("dpkg", "--purge", "loopd", within_s=120)
+        loopd.purge()
     before = files()
     vivid_camera()
     loopd.start()
@@ -49,7 +49,7 @@ def run():
     upgrade()
     note(sh("loopctl", "doctor", loopd.NAME, "--no-trial", may_fail=True))
     note(sh("loopctl", "cameras", within_s=60))
-    sh("dpkg", "--purge", "loopd", within_s=120)
+    loopd.purge()
     left = sorted(files() - before)
     check(not left, f"a purge left {left}")
     check("loopd" not in read("/etc/passwd"), "a purge left the user loopd")

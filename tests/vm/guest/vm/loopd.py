@@ -1,11 +1,13 @@
 """The daemon as a user has it: installed from its package, run by systemd."""
 
+import glob
 import os
 import re
 
 from vm.basics import check, note, read, sh, until, write
 
-PACKAGE = "/share/loopd.deb"
+PACKAGES = sorted(glob.glob("/share/packages/*.deb"))
+NAMES = [os.path.basename(package).partition("_")[0] for package in PACKAGES]
 NAME = "vm"  # of the instance: loopd@vm, /etc/loopd/vm.toml; the runner takes it away after the case
 BACK_WITHIN_S = 5  # of a camera's return, under emulation
 
@@ -24,10 +26,14 @@ SETTINGS = {
 
 
 def install():
-    """Installs the package unless it is installed."""
+    """Installs the packages unless they are installed."""
     if "install ok installed" not in sh("dpkg-query", "-W", "-f", "${Status}", "loopd", may_fail=True):
-        sh("dpkg", "-i", PACKAGE, within_s=120)
-        note("the package is installed")
+        sh("dpkg", "-i", *PACKAGES, within_s=120)
+        note(f"installed: {NAMES}")
+
+
+def purge():
+    sh("dpkg", "--purge", *NAMES, within_s=120)
 
 
 def configure(settings=None, name=NAME):
