@@ -35,15 +35,28 @@ std::string remedy_for(CameraFault fault) {
 }  // namespace
 
 void CaptureLoop::run(Camera& camera) {
-  while (std::visit([this](auto&& event) { return handle(std::move(event)); }, camera.next())) {
-  }
+  if (state_) begin_again();
+  while (std::visit([this](auto&& event) { return handle(std::move(event)); }, camera.next()))
+    counters_.answers.fetch_add(1, std::memory_order_relaxed);
+}
+
+/// What was told of the camera before says nothing about this one.
+void CaptureLoop::begin_again() {
+  fault_.reset();
+  denied_since_ns_.reset();
+  noticed_ = {};
+  told_ns_ = {};
+  state_ = State::kCameraLost;
+  tell({LogLevel::kNotice,
+        {*state_, monotonic_now_ns(), "it is opened again, with other settings", ""},
+        Notice::Kind::kState});
 }
 
 bool CaptureLoop::handle(Frame frame) {
   counters_.frames.fetch_add(1, std::memory_order_relaxed);
+  counters_.away = false;
   if (state_ != State::kRunning && state_ != State::kCameraBack) {
     state_ = state_.has_value() ? State::kCameraBack : State::kRunning;
-    counters_.away = false;
     tell({LogLevel::kNotice,
           {*state_, monotonic_now_ns(), "frames arrive", ""},
           Notice::Kind::kState});

@@ -20,6 +20,7 @@ struct CaptureCounters {
   std::atomic<std::uint64_t> frames = 0;   ///< delivered by the camera
   std::atomic<std::uint64_t> corrupt = 0;  ///< errors that cost one frame
   std::atomic<std::uint64_t> losses = 0;   ///< times that the camera was lost or stalled
+  std::atomic<std::uint64_t> answers = 0;  ///< of the camera, of whatever kind
   std::atomic<bool> away = false;          ///< the camera is known to be lost, stalled or ended
   std::atomic<bool> ended = false;         ///< a recording came to its end
 };
@@ -54,6 +55,7 @@ class CaptureLoop {
     std::int64_t time_ns = 0;
   };
 
+  void begin_again();
   bool handle(Frame frame);
   bool handle(const CameraError& error);
   bool handle(EndOfStream);

@@ -148,8 +148,7 @@ Status Daemon::add_sources() {
     return static_cast<std::uint64_t>(config_.events.stats_interval_s * 1e6);
   };
   std::uint64_t watchdog_us = 0;
-  if (sd_watchdog_enabled(0, &watchdog_us) > 0)
-    liveness_.emplace(patience_for(config_.camera.fps, watchdog_us), monotonic_now_ns());
+  if (sd_watchdog_enabled(0, &watchdog_us) > 0) watch_over_camera();
   Status added = loop_->on_signal(SIGTERM, [this] { end_on_signal("SIGTERM"); });
   if (added) added = loop_->on_signal(SIGINT, [this] { end_on_signal("SIGINT"); });
   if (added) added = loop_->on_signal(SIGHUP, [this] { (void)reload(); });
@@ -158,6 +157,13 @@ Status Daemon::add_sources() {
   if (added && liveness_)
     added = loop_->every([watchdog_us] { return watchdog_us / 4; }, [this] { feed_watchdog(); });
   return added;
+}
+
+/// How long nothing may happen depends on the camera's rate.
+void Daemon::watch_over_camera() {
+  std::uint64_t watchdog_us = 0;
+  sd_watchdog_enabled(0, &watchdog_us);
+  liveness_.emplace(patience_for(config_.camera.fps, watchdog_us), monotonic_now_ns());
 }
 
 Status Daemon::run() {
@@ -175,7 +181,8 @@ Status Daemon::start_pipeline_when_awaited() {
   if (const Status started = pipeline_->start(); !started) return started;
   // Last, since threads inherit the CPUs and the priority of the one that starts them.
   const ThreadOptions options{.cpus = config_.threads.main_cpus,
-                              .priority = config_.threads.main_priority};
+                              .priority = config_.threads.main_priority,
+                              .children_inherit = false};
   std::vector<Error> shortfalls = configure_this_thread(options);
   if (config_.threads.required && !shortfalls.empty()) return shortfalls.front();
   for (Error& error : pipeline_->thread_shortfalls()) shortfalls.push_back(std::move(error));
@@ -268,7 +275,8 @@ void Daemon::publish_stats() {
   if (dropped > std::exchange(dropped_reports_told_, dropped))
     log_.write(LogLevel::kWarning,
                "reports dropped on their way to the socket; raise events.report_queue",
-               {{"since_start", std::to_string(dropped)}}, kIdReportsDropped);
+               {{"camera", config_.camera.name}, {"since_start", std::to_string(dropped)}},
+               kIdReportsDropped);
 }
 
 void Daemon::feed_watchdog() {
@@ -276,13 +284,16 @@ void Daemon::feed_watchdog() {
   const Vitals vitals{.frames_detected = totals.frames,
                       .errors_in_row = totals.errors_in_row,
                       .work_pending = pipeline_->work_pending(),
-                      .nothing_to_do = pipeline_->capture().away || paused_ || !pipeline_started_};
+                      .nothing_to_do = pipeline_->capture().away || paused_ || !pipeline_started_,
+                      .camera_answers = pipeline_->capture().answers,
+                      .camera_owes_answers = pipeline_started_ && !pipeline_->capture().ended};
   if (liveness_->alive(vitals, monotonic_now_ns())) systemd_.tell("WATCHDOG=1");
 }
 
 /// Reads the config again and takes over what can change while running; a config with a mistake
 /// changes nothing.
 Result<std::string> Daemon::reload() {
+  if (ending_) return Error{"the daemon is ending", ESHUTDOWN};
   systemd_.tell("RELOADING=1");
   const LoadedConfig loaded = read_again_();
   Result<std::string> done = loaded.ok() ? take_over(loaded.config) : mistakes_error(loaded);
@@ -296,29 +307,39 @@ Result<std::string> Daemon::reload() {
 
 Result<std::string> Daemon::take_over(const DaemonConfig& wanted) {
   const ConfigChanges changes = changes_between(config_, wanted);
+  if (const auto violations = validate(changes.config); !violations.empty())
+    return Error{"nothing was taken over, since without a restart it would be wrong: " +
+                     violations.front() + "; restart",
+                 EINVAL};
   config_ = changes.config;
-  if (!changes.camera.empty() && pipeline_started_)
-    if (const Status replaced = pipeline_->replace_camera(config_.camera); !replaced)
-      return replaced.error();
+  if (liveness_) watch_over_camera();
+  if (changes.camera.empty()) return changes_text(changes);
+  if (const Status replaced = pipeline_->replace_camera(config_.camera); !replaced) {
+    broken_ = replaced.error();  // no camera thread: nothing is left but to start anew
+    ending_ = true;
+    return replaced.error();
+  }
   return changes_text(changes);
 }
 
 void Daemon::end_on_signal(const char* name) {
-  log_.write(LogLevel::kNotice, "ending", {{"signal", name}}, kIdEnding);
+  log_.write(LogLevel::kNotice, "ending", {{"signal", name}, {"camera", config_.camera.name}},
+             kIdEnding);
   patience_with_clients_ns_ = kPatienceAtSignal_ns;
   ending_ = true;
 }
 
 Status Daemon::shut_down() {
   systemd_.tell("STOPPING=1");
-  control_->end_recording();
   pipeline_->stop();
   take_from_pipeline();
   publish_stats();
   server_->publish_state(state_now(State::kShuttingDown, ""));
   const Status sent = send_what_is_queued();
+  control_->end_recording();  // last, since a slow disk takes its time
   control_.reset();
   server_.reset();
+  if (broken_) return *broken_;
   if (const std::optional<std::string> failure = pipeline_->failure()) return Error{*failure, 0};
   return sent;
 }

@@ -62,6 +62,7 @@ class Daemon final : private Controllable {
   void tell(const Notice& notice);
   void publish_stats();
   void feed_watchdog();
+  void watch_over_camera();
   void end_on_signal(const char* name);
   Status shut_down();
   Status send_what_is_queued();
@@ -79,6 +80,7 @@ class Daemon final : private Controllable {
   std::optional<Liveness> liveness_;  ///< none: systemd watches not
   bool pipeline_started_ = false;
   bool ending_ = false;
+  std::optional<Error> broken_;  ///< why it ends, if not by request
   bool paused_ = false;
   std::uint32_t map_ = 0;                  ///< the map that published image ids belong to
   std::int64_t patience_with_clients_ns_;  ///< to take what is queued, once ending

@@ -41,7 +41,9 @@ bool DetectLoop::held_back() {
   std::unique_lock lock(pause_mutex_);
   if (!paused_) return false;
   if (!live_times_) {
+    holding_ = true;
     pause_ended_.wait(lock, [this] { return !paused_; });
+    holding_ = false;
     return false;
   }
   const std::lock_guard totals_lock(totals_mutex_);

@@ -56,9 +56,12 @@ class DetectLoop {
   /// A consistent copy.
   DetectTotals totals() const;
 
-  /// While paused no frame is worked on: of a live camera they are thrown away, a recording waits.
+  /// While paused no frame is worked on: in real time they are thrown away, in lock-step the
+  /// recording waits.
   void pause();
   void resume();
+  /// A frame waits for the end of a pause.
+  bool holding() const { return holding_; }
   /// Empties the map before the next frame. Reports are marked with the number of resets before
   /// them (TakenReport::map), so that none is taken for one of another map.
   void reset() { wanted_map_.fetch_add(1, std::memory_order_relaxed); }
@@ -86,6 +89,7 @@ class DetectLoop {
   std::mutex pause_mutex_;
   std::condition_variable pause_ended_;
   bool paused_ = false;
+  std::atomic<bool> holding_ = false;
   bool failing_ = false;
   Report report_;
   mutable std::mutex totals_mutex_;

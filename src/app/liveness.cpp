@@ -10,6 +10,9 @@ bool Liveness::alive(const Vitals& vitals, std::int64_t now_ns) {
   const bool idle_for_a_reason = vitals.nothing_to_do && !vitals.work_pending;
   if (vitals.frames_detected != frames_seen_ || idle_for_a_reason) advanced_ns_ = now_ns;
   frames_seen_ = vitals.frames_detected;
+  if (vitals.camera_answers != answers_seen_ || !vitals.camera_owes_answers) answered_ns_ = now_ns;
+  answers_seen_ = vitals.camera_answers;
+  if (idle_for_a_reason && now_ns - answered_ns_ > kLongestSilence_ns) return false;
   if (vitals.errors_in_row >= DetectLoop::kMostErrorsInRow) return false;
   return now_ns - advanced_ns_ <= patience_ns_;
 }

@@ -1,5 +1,7 @@
 #include "app/pipeline.h"
 
+#include <sched.h>
+
 #include <cassert>
 #include <exception>
 #include <utility>
@@ -8,6 +10,17 @@
 
 namespace loopd {
 namespace {
+
+/// The CPUs that this thread may use.
+std::vector<int> allowed_cpus() {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  std::vector<int> cpus;
+  if (sched_getaffinity(0, sizeof(set), &set) != 0) return cpus;
+  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu)
+    if (CPU_ISSET(static_cast<std::size_t>(cpu), &set)) cpus.push_back(cpu);
+  return cpus;
+}
 
 ThreadOptions thread_options(const char* name, const std::vector<int>& cpus, int priority,
                              bool required) {
@@ -56,6 +69,7 @@ Result<std::unique_ptr<Pipeline>> Pipeline::open(const DaemonConfig& config) {
 
 Pipeline::Pipeline(const DaemonConfig& config, Parts parts)
     : threads_(config.threads),
+      all_cpus_(allowed_cpus()),
       pool_(std::move(parts.pool)),
       camera_(std::move(parts.camera)),
       lanes_(std::move(parts.lanes)),
@@ -78,15 +92,17 @@ Status Pipeline::start() {
 }
 
 Status Pipeline::start_capture() {
+  // Its CPUs are always named: a later one is started by a thread that has others by then.
+  const std::vector<int>& cpus = threads_.capture_cpus.empty() ? all_cpus_ : threads_.capture_cpus;
   return start_thread(capture_thread_,
-                      thread_options("capture", threads_.capture_cpus, threads_.capture_priority,
-                                     threads_.required),
+                      thread_options("capture", cpus, threads_.capture_priority, threads_.required),
                       [this] { capture_.run(*camera_); });
 }
 
 Status Pipeline::replace_camera(const CameraConfig& config) {
   assert(config.live() && "a recording has an end, after which nothing can follow");
   // In this order: a device is busy as long as the camera before has it.
+  const bool running = capture_thread_.running();
   camera_->interrupt();
   capture_thread_.join();
   dropped_before_ += camera_->dropped();
@@ -96,6 +112,7 @@ Status Pipeline::replace_camera(const CameraConfig& config) {
   auto camera = open_camera(config, *pool_);
   assert(camera.ok() && "a live camera need not be there");
   camera_ = std::move(camera).value();
+  if (!running) return Nothing{};
   return start_capture();
 }
 
@@ -131,6 +148,7 @@ bool Pipeline::work_pending() const {
   // Read in this order, what is still pending may be missed for a moment but never made up.
   const std::uint64_t delivered = capture_counters_.frames;
   const DetectTotals done = totals();
+  if (detect_.holding()) return false;
   return delivered > mailbox_.overwritten() + done.frames + done.skipped;
 }
 

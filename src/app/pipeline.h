@@ -40,7 +40,7 @@ class Pipeline {
   Status start();
   /// Goes on with another live camera, or the same with other settings; map and detector stay.
   /// Waits until the old one is closed, a second at most but for a driver that hangs. Error: no
-  /// thread. Precondition: started, and `config` is live.
+  /// thread, after which nothing is captured any more. Precondition: `config` is live.
   Status replace_camera(const CameraConfig& config);
   /// See DetectLoop.
   void pause() { detect_.pause(); }
@@ -85,6 +85,7 @@ class Pipeline {
                       std::function<void()> body);
 
   const ThreadsConfig threads_;
+  const std::vector<int> all_cpus_;  ///< that the process may use, before main has its own
   // In this order: what is declared later uses what is declared before.
   std::unique_ptr<FramePool> pool_;
   std::unique_ptr<Camera> camera_;

@@ -1,5 +1,9 @@
 #include "app/remote_control.h"
 
+#include <linux/magic.h>
+#include <sys/vfs.h>
+
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -8,9 +12,18 @@
 namespace loopd {
 namespace {
 
+constexpr std::uint64_t kMostBytesInMemory = std::uint64_t{128} << 20;
+
 ControlReply done() { return {}; }
 
 std::int64_t signed_of(std::uint64_t value) { return static_cast<std::int64_t>(value); }
+
+/// A file in memory counts as the daemon's own, and must leave room for the map.
+bool is_in_memory(const UniqueFd& file) {
+  struct statfs status {};
+  return fstatfs(file.get(), &status) == 0 &&
+         (status.f_type == TMPFS_MAGIC || status.f_type == RAMFS_MAGIC);
+}
 
 ControlFields fields_of(const RecordingResult& result) {
   ControlFields fields{{"frames", signed_of(result.frames)},
@@ -42,9 +55,9 @@ Result<std::unique_ptr<RemoteControl>> RemoteControl::open(
 ControlReply RemoteControl::handle(ControlRequest request) {
   if (request.op == ControlOp::kStatus) return status();
   log_.write(LogLevel::kNotice, "asked to",
-             {{"op", std::string(control_op_name(request.op))},
-              {"pid", std::to_string(request.pid)},
-              {"uid", std::to_string(request.uid)}},
+             {{"camera", defaults_.camera},
+              {"op", std::string(control_op_name(request.op))},
+              {"pid", std::to_string(request.pid)}},  // its user is hidden by PrivateUsers=
              kIdControl);
   switch (request.op) {
     case ControlOp::kPause:
@@ -87,6 +100,8 @@ ControlReply RemoteControl::record(ControlRequest request) {
   RecordingOptions options = defaults_;
   options.limits.duration_ns = std::llround(request.limits.seconds * 1e9);
   options.limits.bytes = request.limits.max_bytes;
+  if (is_in_memory(request.file))
+    options.limits.bytes = std::min(options.limits.bytes, kMostBytesInMemory);
   const Status started =
       recorder_.start(std::move(request.file), options,
                       [this](const RecordingResult& result) { recorded(result); });
@@ -111,7 +126,8 @@ void RemoteControl::gone(std::uint64_t client) {
 void RemoteControl::recorded(const RecordingResult& result) {
   const bool failed = !result.message.empty();
   log_.write(failed ? LogLevel::kWarning : LogLevel::kNotice, "recorded",
-             {{"frames", std::to_string(result.frames)},
+             {{"camera", defaults_.camera},
+              {"frames", std::to_string(result.frames)},
               {"bytes", std::to_string(result.bytes)},
               {"lost", std::to_string(result.lost)},
               {"reason", std::string(recording_end_name(result.end.value()))},

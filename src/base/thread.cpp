@@ -70,8 +70,9 @@ std::optional<Error> set_cpus(const ThreadOptions& options) {
 std::optional<Error> set_priority(const ThreadOptions& options) {
   sched_param param{};
   param.sched_priority = options.priority;
-  const int code = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param);
-  if (code == 0) return std::nullopt;
+  const int policy = SCHED_FIFO | (options.children_inherit ? 0 : SCHED_RESET_ON_FORK);
+  if (sched_setscheduler(0, policy, &param) == 0) return std::nullopt;  // 0: this thread
+  const int code = errno;
   Error failure = errno_error("cannot give thread '" + options.name + "' real-time priority " +
                                   std::to_string(options.priority),
                               code);

@@ -219,7 +219,8 @@ CaptureDevice::Grab LibcameraDevice::grab(const Interrupt& interrupt, std::int64
     if (board_.disconnected()) lost_ = unplugged();
     if (lost_) return *lost_;
     if (auto frame = newest_frame()) return *frame;
-    if (lost_) return *lost_;
+    if (board_.disconnected() || lost_) continue;  // told while the frames were looked at
+    if (monotonic_now_ns() >= deadline_ns) return nothing_came();
     switch (wait(interrupt, deadline_ns)) {
       case Wait::kInterrupted:
         return Interrupted{};

@@ -269,7 +269,7 @@ class LiveCamera : public Camera {
 
   // Passes the error of one frame on, or gives the device up if there is nothing else.
   CameraEvent bad_frame(CameraError error) {
-    if (error.fault == CameraFault::kTooLarge) return error;  // a setting, not the device
+    if (error.fault == CameraFault::kTooLarge) return lose(std::move(error));  // so are all others
     ++bad_;
     const bool for_long =
         bad_ >= kFewBadFrames && clock_->now_ns() - last_good_ns_ >= patience_ns();

@@ -36,11 +36,12 @@ class LiveClock {
 ///
 /// Frames: the newest wins; those passed over, gaps in the driver's sequence, and frames for which
 /// no buffer was free are counted by dropped(). Damaged, short and undecodable ones are errors
-/// (kCorruptFrame) that cost that frame only. Frame::sequence is the driver's, made to grow without
-/// a step back over re-opening; with a driver whose sequence does not grow, it counts what came.
-/// Frame::time_ns is the driver's stamp where it can be believed (not in the future, not standing
-/// still or going back, not older than the stream), else the time at which the frame came, with one
-/// notice a kind and opening; see restamped().
+/// (kCorruptFrame) that cost that frame only; one with more pixels than a buffer holds is the loss
+/// of the camera (kTooLarge), since all others are like it. Frame::sequence is the driver's, made
+/// to grow without a step back over re-opening; with a driver whose sequence does not grow, it
+/// counts what came. Frame::time_ns is the driver's stamp where it can be believed (not in the
+/// future, not standing still or going back, not older than the stream), else the time at which the
+/// frame came, with one notice a kind and opening; see restamped().
 ///
 /// `pool` and `clock` must outlive the camera. Errors: none; all that can go wrong is told by
 /// next().

@@ -104,9 +104,9 @@ struct LumaConverter::Jpeg {
     return std::nullopt;
   }
 
+  // What the driver promised has been found small enough: a larger JPEG is a damaged one.
   static Problem problem_of(const Error& error) {
-    return {error.code == EFBIG ? CameraFault::kTooLarge : CameraFault::kCorruptFrame,
-            error.message};
+    return {CameraFault::kCorruptFrame, error.message};
   }
 
   ImageDecoder decoder;

@@ -144,8 +144,14 @@ CaptureDevice::Grab V4l2Device::grab_newest(short happened) {
   if (result == -EAGAIN && (happened & (POLLERR | POLLHUP | POLLNVAL)) != 0) return failed(-EIO);
   if (result == -EAGAIN) return TimedOut{};
   if (result < 0) return failed(result);
-  while (passed_over < kMaxPassedOver && buffers_->take(next) >= 0) {
-    buffers_->give_back(newest.index);  // if that fails, the next grab() tries again
+  const auto is_damaged = [](const V4l2Buffers::Filled& filled) {
+    return (filled.flags & V4L2_BUF_FLAG_ERROR) != 0;
+  };
+  for (std::uint64_t taken = 0; taken < kMaxPassedOver && buffers_->take(next) >= 0; ++taken) {
+    // A frame of no use takes no good one's place; its number is missing then.
+    const bool keep = is_damaged(next) && !is_damaged(newest);
+    buffers_->give_back(keep ? next.index : newest.index);  // if that fails, the next grab() does
+    if (keep) continue;
     newest = next;
     ++passed_over;
   }

@@ -101,9 +101,11 @@ int Connections::on_client(sd_event_source*, int fd, std::uint32_t events, void*
 
 void Connections::serve(Connection& client, std::uint32_t events) {
   const Serving serving(*this);
-  if ((events & (EPOLLHUP | EPOLLERR)) != 0) return client.end();
+  if ((events & EPOLLERR) != 0) return client.end();
   if ((events & EPOLLIN) != 0) client.receive(scratch_);
   answer_requests(client);
+  // Who asks and leaves at once is still heard.
+  if ((events & EPOLLHUP) != 0) return client.end();
   client.flush(handler_);
   handler_.refill(client);
   answer_requests(client);  // what had to wait while the queue was full

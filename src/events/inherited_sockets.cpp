@@ -32,7 +32,9 @@ std::optional<std::string> bound_path(int fd) {
   if (address.sun_family != AF_UNIX || bytes <= kBefore || address.sun_path[0] == '\0') {
     return std::nullopt;
   }
-  return std::string(address.sun_path, strnlen(address.sun_path, bytes - kBefore));
+  return std::string(
+      address.sun_path,
+      strnlen(address.sun_path, std::min<std::size_t>(bytes - kBefore, sizeof(address.sun_path))));
 }
 
 /// Whether both name the same file, be it through a link like /var/run.

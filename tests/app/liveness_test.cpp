@@ -48,6 +48,19 @@ TEST(Liveness, FailingFrameAfterFrameIsNot) {
   EXPECT_TRUE(liveness.alive({.frames_detected = 3}, 3));
 }
 
+TEST(Liveness, ALostCameraThatSaysNothingForAMinuteIsAHungDriver) {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  Liveness liveness(kSecond, 0);
+  Vitals vitals{.nothing_to_do = true, .camera_owes_answers = true};
+  EXPECT_TRUE(liveness.alive(vitals, 59 * kSecond));
+  ++vitals.camera_answers;
+  EXPECT_TRUE(liveness.alive(vitals, 60 * kSecond));
+  EXPECT_TRUE(liveness.alive(vitals, 119 * kSecond));
+  EXPECT_FALSE(liveness.alive(vitals, 121 * kSecond));
+  vitals.camera_owes_answers = false;  // a recording at its end
+  EXPECT_TRUE(liveness.alive(vitals, 500 * kSecond));
+}
+
 TEST(Liveness, PatienceFitsSlowCameras) {
   EXPECT_EQ(patience_for(30, 10'000'000), 5'000'000'000);
   EXPECT_EQ(patience_for(0, 10'000'000), 5'000'000'000);
