@@ -29,7 +29,9 @@ def strike(choice, camera):
 
 def run():
     minutes = float(os.environ.get("LOOPD_VM_MINUTES", "5"))
-    camera, choice, count = vivid_camera(), random.Random(1), 0
+    vivid_camera()
+    choice, count = random.Random(1), 0
+    camera = "/dev/v4l/by-path/platform-vivid.0-video-index0"  # whichever number the node gets
     loopd.start({"camera.path": camera})
     with Events() as events:
         events.frames(3)
