@@ -181,8 +181,7 @@ Status Daemon::start_pipeline_when_awaited() {
   if (const Status started = pipeline_->start(); !started) return started;
   // Last, since threads inherit the CPUs and the priority of the one that starts them.
   const ThreadOptions options{.cpus = config_.threads.main_cpus,
-                              .priority = config_.threads.main_priority,
-                              .children_inherit = false};
+                              .priority = config_.threads.main_priority};
   std::vector<Error> shortfalls = configure_this_thread(options);
   if (config_.threads.required && !shortfalls.empty()) return shortfalls.front();
   for (Error& error : pipeline_->thread_shortfalls()) shortfalls.push_back(std::move(error));

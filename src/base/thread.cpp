@@ -70,9 +70,10 @@ std::optional<Error> set_cpus(const ThreadOptions& options) {
 std::optional<Error> set_priority(const ThreadOptions& options) {
   sched_param param{};
   param.sched_priority = options.priority;
-  const int policy = SCHED_FIFO | (options.children_inherit ? 0 : SCHED_RESET_ON_FORK);
-  if (sched_setscheduler(0, policy, &param) == 0) return std::nullopt;  // 0: this thread
-  const int code = errno;
+  // None asked for is the ordinary scheduler, also where a thread with a priority starts this one.
+  const int policy = options.priority > 0 ? SCHED_FIFO : SCHED_OTHER;
+  const int code = pthread_setschedparam(pthread_self(), policy, &param);
+  if (code == 0) return std::nullopt;
   Error failure = errno_error("cannot give thread '" + options.name + "' real-time priority " +
                                   std::to_string(options.priority),
                               code);
@@ -80,6 +81,14 @@ std::optional<Error> set_priority(const ThreadOptions& options) {
       "; allow it with LimitRTPRIO= or AmbientCapabilities=CAP_SYS_NICE in the service (by hand: "
       "`ulimit -r`), or set the priority to 0";
   return failure;
+}
+
+/// Whether this thread has a real-time priority, its own or that of who started it.
+bool has_priority() {
+  int policy = SCHED_OTHER;
+  sched_param param{};
+  return pthread_getschedparam(pthread_self(), &policy, &param) == 0 && policy != SCHED_OTHER &&
+         param.sched_priority > 0;
 }
 
 std::string joined(const std::vector<Error>& errors) {
@@ -119,7 +128,7 @@ std::vector<Error> configure_this_thread(const ThreadOptions& options) {
   };
   if (!options.name.empty()) note(set_name(options.name));
   if (!options.cpus.empty()) note(set_cpus(options));
-  if (options.priority > 0) note(set_priority(options));
+  if (options.priority > 0 || has_priority()) note(set_priority(options));
   return shortfalls;
 }
 

@@ -17,8 +17,6 @@ struct ThreadOptions {
   int priority = 0;         ///< 0: the ordinary scheduler; 1..99: SCHED_FIFO with this priority
   /// True: a thread that cannot have these CPUs and this priority does not start.
   bool required = false;
-  /// False: threads that this one starts have the ordinary scheduler, whatever its priority.
-  bool children_inherit = true;
 };
 
 /// Applies `options` to the calling thread. Returns what could not be had, one Error each with its

@@ -106,6 +106,17 @@ TEST(NamedThread, DoesNotStartWithoutWhatIsRequired) {
   EXPECT_FALSE(ran);
 }
 
+TEST(NamedThread, WithoutAPriorityItHasTheOrdinarySchedulerWhoeverStartsIt) {
+  int policy = -1;
+  const auto start_another = [&policy] {
+    auto inner = NamedThread::start(
+        {.name = "inner"}, [&policy] { policy = sched_getscheduler(0); }, nullptr);
+    ASSERT_TRUE(inner.ok());
+  };
+  { auto outer = NamedThread::start({.name = "outer", .priority = 7}, start_another, nullptr); }
+  EXPECT_EQ(policy, SCHED_OTHER);
+}
+
 // Whether a real-time priority may be had depends on the machine; it is had, or the remedy named.
 TEST(NamedThread, HasItsPriorityOrSaysHowToGetIt) {
   int policy = -1;
