@@ -147,23 +147,20 @@ Status Daemon::add_sources() {
   const auto stats_us = [this] {
     return static_cast<std::uint64_t>(config_.events.stats_interval_s * 1e6);
   };
-  std::uint64_t watchdog_us = 0;
-  if (sd_watchdog_enabled(0, &watchdog_us) > 0) watch_over_camera();
+  if (sd_watchdog_enabled(0, &watchdog_us_) > 0) watch_over_camera();
   Status added = loop_->on_signal(SIGTERM, [this] { end_on_signal("SIGTERM"); });
   if (added) added = loop_->on_signal(SIGINT, [this] { end_on_signal("SIGINT"); });
   if (added) added = loop_->on_signal(SIGHUP, [this] { (void)reload(); });
   if (added) added = loop_->on_readable(pipeline_->wake_fd(), [this] { take_from_pipeline(); });
   if (added) added = loop_->every(stats_us, [this] { publish_stats(); });
   if (added && liveness_)
-    added = loop_->every([watchdog_us] { return watchdog_us / 4; }, [this] { feed_watchdog(); });
+    added = loop_->every([this] { return watchdog_us_ / 4; }, [this] { feed_watchdog(); });
   return added;
 }
 
 /// How long nothing may happen depends on the camera's rate.
 void Daemon::watch_over_camera() {
-  std::uint64_t watchdog_us = 0;
-  sd_watchdog_enabled(0, &watchdog_us);
-  liveness_.emplace(patience_for(config_.camera.fps, watchdog_us), monotonic_now_ns());
+  liveness_.emplace(patience_for(config_.camera.fps, watchdog_us_), monotonic_now_ns());
 }
 
 Status Daemon::run() {

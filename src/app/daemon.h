@@ -77,6 +77,7 @@ class Daemon final : private Controllable {
   std::unique_ptr<RemoteControl> control_;
   StateRecord state_;  ///< the newest of camera and detector, told again after a pause or a reset
   StatsMeter stats_;
+  std::uint64_t watchdog_us_ = 0;     ///< systemd's; meaningless without liveness_
   std::optional<Liveness> liveness_;  ///< none: systemd watches not
   bool pipeline_started_ = false;
   bool ending_ = false;

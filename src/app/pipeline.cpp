@@ -101,13 +101,12 @@ Status Pipeline::start_capture() {
 
 Status Pipeline::replace_camera(const CameraConfig& config) {
   assert(config.live() && "a recording has an end, after which nothing can follow");
-  // In this order: a device is busy as long as the camera before has it.
   const bool running = capture_thread_.running();
   camera_->interrupt();
   capture_thread_.join();
   dropped_before_ += camera_->dropped();
   restamped_before_ += camera_->restamped();
-  camera_.reset();
+  camera_.reset();                // before the next is made: a device is busy as long as it is open
   capture_counters_.away = true;  // no frame is owed until the new one gives its first
   auto camera = open_camera(config, *pool_);
   assert(camera.ok() && "a live camera need not be there");
