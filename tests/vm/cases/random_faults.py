@@ -13,6 +13,7 @@ from vm.events import Events
 
 FAULTS = ("inject_v4l2_buf_flag_error", "inject_fatal_streaming_error", "inject_vidioc_reqbufs_error",
           "inject_vidioc_streamon_error", "inject_vidioc_qbuf_error", "disconnect")
+SETTLING = 0.2  # of the time: each way to fail has been met, the allocator has what these need
 
 
 def strike(choice, camera):
@@ -35,7 +36,8 @@ def run():
     loopd.start({"camera.path": camera})
     with Events() as events:
         events.frames(3)
-        end, before = time.monotonic() + minutes * 60, None
+        begun = minute = time.monotonic()
+        end, before = begun + minutes * 60, None
         while time.monotonic() < end:
             fault = strike(choice, camera)
             try:
@@ -43,7 +45,10 @@ def run():
             except AssertionError as failure:
                 raise AssertionError(f"no frame after fault {count}, {fault}: {failure}") from failure
             count += 1
-            if count == 10:
+            if time.monotonic() >= minute + 60:
+                minute += 60
+                note(f"{count} faults: {loopd.Footprint(loopd.main_pid())}")
+            if before is None and time.monotonic() >= begun + minutes * 60 * SETTLING and count >= 10:
                 before = loopd.Footprint(loopd.main_pid())
                 map_before = events.next("stats", 10)["bytes"]
         note(f"{count} faults")

@@ -119,9 +119,11 @@ class Footprint:
         status = read(f"/proc/{pid}/status")
         self.threads = int(re.search(r"^Threads:\s*(\d+)", status, re.M).group(1))
         self.rss_kib = int(re.search(r"^VmRSS:\s*(\d+)", status, re.M).group(1))
+        self.anonymous_kib = int(re.search(r"^RssAnon:\s*(\d+)", status, re.M).group(1))
 
     def __str__(self):
-        return f"{self.descriptors} descriptors, {self.threads} threads, {self.rss_kib} KiB"
+        return (f"{self.descriptors} descriptors, {self.threads} threads, "
+                f"{self.rss_kib} KiB ({self.anonymous_kib} anonymous)")
 
 
 def check_no_growth(before, after, rss_kib):
