@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <string_view>
@@ -63,6 +64,9 @@ struct Config {
   IndexConfig index;
   LoopConfig loop;
   VerifyConfig verify;
+  /// For everything the detector keeps: images, words, look-up tables. Its capacities follow from
+  /// it and never change. The daemon gives it what memory.budget_mib leaves.
+  std::int64_t memory_budget_bytes = std::int64_t{192} << 20;
 };
 
 /// Where one parameter's value lives inside a config.

@@ -53,11 +53,13 @@ class Detector {
   void clear();
 
   /// Features of the newest processed frame, or of a searchable image; null if `image` is neither.
-  /// Valid until the next call of process() or absorb().
-  const Features* features(ImageId image) const;
+  /// Valid until the next call of this, process() or absorb().
+  const Features* features(ImageId image);
 
-  /// Bytes held by map, vocabularies and working memory.
+  /// Bytes of the map and the vocabularies that are in use.
   std::size_t bytes() const;
+  /// Bytes when they are full: at most `Config::memory_budget_bytes`.
+  std::size_t capacity_bytes() const;
 
  private:
   const Config config_;

@@ -96,6 +96,15 @@ struct StageTimes {
   std::int64_t total_ns = 0;   ///< frame taken to ready for the next, absorb included
 };
 
+/// Images that the memory budget has cost so far, by what there was no room for.
+struct Evictions {
+  std::uint64_t for_images = 0;  ///< searchable images, for the features of new ones
+  std::uint64_t for_words = 0;   ///< searchable images, for the words of new ones
+  std::uint64_t waiting = 0;     ///< images of the waiting window, which filled half the map
+  std::uint64_t not_kept = 0;    ///< new images that found no room in the time a frame has
+  friend bool operator==(const Evictions&, const Evictions&) = default;
+};
+
 /// Everything the detector decided about one frame and why. One per frame, whatever happened;
 /// fixed capacity, meant to be reused. Daemon, tools and tests all read this one type.
 struct Report {
@@ -123,7 +132,8 @@ struct Report {
   std::size_t words_points = 0;  ///< vocabulary sizes after absorb()
   std::size_t words_lines = 0;
   std::size_t images = 0;  ///< searchable images after absorb()
-  std::size_t bytes = 0;   ///< held by the detector after absorb()
+  std::size_t bytes = 0;   ///< of map and vocabularies in use after absorb()
+  Evictions evictions;     ///< since the detector was made or cleared
 
   /// Back to the state of a new Report, keeping nothing.
   void clear();

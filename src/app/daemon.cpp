@@ -1,6 +1,7 @@
 #include "app/daemon.h"
 
 #include <signal.h>
+#include <sys/mman.h>
 #include <sys/random.h>
 #include <systemd/sd-daemon.h>
 
@@ -104,6 +105,7 @@ Result<std::unique_ptr<Daemon>> Daemon::start(const DaemonConfig& config, ReadCo
     return opened.error();
   if (const Status added = daemon->add_sources(); !added) return added.error();
   daemon->server_->publish_state(state_now(State::kStarting, ""));
+  if (config.memory.lock) daemon->lock_memory();
   log.write(LogLevel::kInfo, "listening",
             {{"socket", event_socket_path(config)},
              {"camera", config.camera.name},
@@ -126,6 +128,13 @@ Daemon::Daemon(const DaemonConfig& config, ReadConfig read_again, const Log& log
       patience_with_clients_ns_(kPatienceAtEnd_ns) {}
 
 Daemon::~Daemon() = default;
+
+// All that is mapped now and later; the map is, and its untouched pages come in by this.
+void Daemon::lock_memory() {
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return;
+  log_.warning(errno_error("memory.lock: cannot keep the memory in place", errno).message +
+               "; raise LimitMEMLOCK= above memory.budget_mib");
+}
 
 Status Daemon::open_control(InheritedSockets& inherited, const Identity& identity) {
   RecordingOptions recording;

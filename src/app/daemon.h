@@ -53,6 +53,7 @@ class Daemon final : private Controllable {
 
   Status open_control(InheritedSockets& inherited, const Identity& identity);
   Status add_sources();
+  void lock_memory();
   Status start_pipeline_when_awaited();
   void take_from_pipeline();
   void publish(const TakenReport& taken);

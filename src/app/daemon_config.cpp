@@ -5,9 +5,11 @@
 #include <cassert>
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <utility>
 
+#include "app/memory_plan.h"
 #include "app/parameter_text.h"
 
 namespace loopd {
@@ -143,6 +145,16 @@ const std::array kOwnParameters = {
         "what does not fit is dropped and counted, rejected candidates first; in lock-step the "
         "detector waits.",
         LOOPD_REF(events.report_queue)},
+
+    Row{"memory.budget_mib", "MiB", 16, 1'048'576,
+        "For everything that grows and every buffer: frames, reports, queues of clients, and what "
+        "is left for the map. When the map is full, images that others cover are forgotten. "
+        "loopd --check shows the parts.",
+        LOOPD_REF(memory.budget_mib)},
+    Row{"memory.lock", "", 0, 1,
+        "Keep all of it in physical memory from the start, so that no frame waits for a page. "
+        "Needs LimitMEMLOCK= above the budget.",
+        LOOPD_REF(memory.lock)},
 };
 
 #undef LOOPD_REF
@@ -212,7 +224,11 @@ std::vector<std::string> validate(const DaemonConfig& config) {
     violations.push_back("camera.name = " + toml_string(config.camera.name) +
                          ". Violated constraint: camera.name holds only letters, digits, - and _");
   for (std::string& text : camera_violations(config.camera)) violations.push_back(std::move(text));
-  for (std::string& text : validate(config.detector)) violations.push_back(std::move(text));
+  Config detector = config.detector;
+  detector.memory_budget_bytes = std::numeric_limits<std::int64_t>::max();
+  for (std::string& text : validate(detector)) violations.push_back(std::move(text));
+  if (violations.empty())
+    if (auto text = budget_violation(config)) violations.push_back(*std::move(text));
   return violations;
 }
 

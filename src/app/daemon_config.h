@@ -28,7 +28,7 @@ struct CameraConfig {
   bool exit_at_end = false;
   int wait_for_clients = 0;
   std::string faults;
-  int max_pixels = 12'582'912;
+  int max_pixels = 8'388'608;
   int buffers = 4;
 
   /// A real camera, which comes and goes; else a recording.
@@ -63,11 +63,18 @@ struct EventsConfig {
   int report_queue = 16;
 };
 
+/// Memory.
+struct MemoryConfig {
+  int budget_mib = 256;
+  bool lock = false;
+};
+
 /// Everything the daemon is told. Plain values: copy it, change it, `validate` it once.
 struct DaemonConfig {
   CameraConfig camera;
   ThreadsConfig threads;
   EventsConfig events;
+  MemoryConfig memory;
   Config detector;
 };
 

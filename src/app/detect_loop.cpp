@@ -86,6 +86,7 @@ void DetectLoop::add_to_totals(const Report& report) {
   totals_.words_points = report.words_points;
   totals_.words_lines = report.words_lines;
   totals_.bytes = report.bytes;
+  totals_.evictions = report.evictions;
 }
 
 void DetectLoop::watch_errors() {

@@ -28,6 +28,7 @@ struct DetectTotals {
   std::size_t words_points = 0;
   std::size_t words_lines = 0;
   std::size_t bytes = 0;
+  Evictions evictions;
 };
 
 /// The detect thread's work: the newest frame, process, hand the report over, wake main, absorb.

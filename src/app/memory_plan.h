@@ -1,30 +1,39 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 
 #include "app/daemon_config.h"
+#include "loopd/capacity.h"
 
 namespace loopd {
 
-/// What a config costs in memory, bytes: what is bounded, and what each image adds to the map.
+/// What a config costs in memory, bytes: buffers of a fixed size, and the map that has the rest of
+/// the budget.
 struct MemoryPlan {
+  std::size_t budget = 0;
   std::size_t frame_buffers = 0;
   std::size_t reports = 0;
   std::size_t client_queues = 0;   ///< at most: all clients, all queues full
   std::size_t control_queues = 0;  ///< the same on the control socket
   std::size_t history = 0;         ///< records kept for clients that connect again
   std::size_t recording = 0;       ///< while loopctl record runs
-  std::size_t image_features = 0;  ///< kept of one image to verify against
-  std::size_t image_words = 0;     ///< at most: every feature a new word
+  MapCapacity map;
 
   std::size_t fixed() const {
-    return frame_buffers + reports + client_queues + control_queues + history;
+    return frame_buffers + reports + client_queues + control_queues + history + recording;
   }
-  std::size_t per_image() const { return image_features + image_words; }
 };
 
 MemoryPlan memory_plan(const DaemonConfig& config);
+
+/// The detector's config, with the part of the budget that is its own.
+Config detector_config(const DaemonConfig& config);
+
+/// What is wrong if memory.budget_mib is too small for all that the config asks for. Precondition:
+/// nothing else is wrong with it.
+std::optional<std::string> budget_violation(const DaemonConfig& config);
 
 /// The plan as lines of comment (#) for people.
 std::string memory_text(const MemoryPlan& plan);

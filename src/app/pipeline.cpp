@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "app/camera_factory.h"
+#include "app/memory_plan.h"
 
 namespace loopd {
 namespace {
@@ -75,7 +76,8 @@ Pipeline::Pipeline(const DaemonConfig& config, Parts parts)
       lanes_(std::move(parts.lanes)),
       wakeup_(std::move(parts.wakeup)),
       reports_(static_cast<std::size_t>(config.events.report_queue), config.camera.lock_step()),
-      detector_(config.detector, lanes_.get()),
+      detector_(detector_config(config), lanes_.get()),
+      map_bytes_(detector_.capacity_bytes()),
       capture_(mailbox_, tap_, notices_, wakeup_, capture_counters_, config.camera.lock_step()),
       detect_(detector_, mailbox_, reports_, notices_, wakeup_, capture_counters_,
               !config.camera.lock_step()) {}

@@ -60,6 +60,8 @@ class Pipeline {
   ReportQueue::Lent take_report() { return reports_.take(); }
 
   DetectTotals totals() const { return detect_.totals(); }
+  /// Bytes of the map when it is full.
+  std::size_t map_bytes() const { return map_bytes_; }
   const CaptureCounters& capture() const { return capture_counters_; }
   /// Frames that never reached the detector, by whoever's fault.
   std::uint64_t dropped_frames() const {
@@ -99,6 +101,7 @@ class Pipeline {
   std::uint64_t dropped_before_ = 0;    ///< by the cameras before this one
   std::uint64_t restamped_before_ = 0;  ///< likewise
   Detector detector_;
+  const std::size_t map_bytes_;
   CaptureLoop capture_;
   DetectLoop detect_;
   mutable std::mutex failure_mutex_;

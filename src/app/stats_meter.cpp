@@ -34,6 +34,8 @@ StatsRecord StatsMeter::record(const Pipeline& pipeline, std::int64_t now_ns) {
   record.words_points = now.words_points;
   record.words_lines = now.words_lines;
   record.bytes = now.bytes;
+  record.budget_bytes = pipeline.map_bytes();
+  record.evictions = now.evictions;
   if (now_ns > before_ns_)
     record.frame_rate_hz = static_cast<double>(now.frames - before_.frames) * 1e9 /
                            static_cast<double>(now_ns - before_ns_);

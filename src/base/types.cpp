@@ -72,6 +72,7 @@ void Report::clear() {
   words_lines = 0;
   images = 0;
   bytes = 0;
+  evictions = {};
 }
 
 }  // namespace loopd

@@ -235,6 +235,11 @@ std::string stats_text(const StatsRecord& record, const ServerStats& server,
   json["words_points"] = record.words_points;
   json["words_lines"] = record.words_lines;
   json["bytes"] = record.bytes;
+  json["budget_bytes"] = record.budget_bytes;
+  json["evicted"] = {{"for_images", record.evictions.for_images},
+                     {"for_words", record.evictions.for_words},
+                     {"waiting", record.evictions.waiting},
+                     {"not_kept", record.evictions.not_kept}};
   json["restamped"] = record.restamped;
   json["camera_losses"] = record.camera_losses;
   if (record.frame_rate_hz) set_finite(json, "frame_rate_hz", *record.frame_rate_hz);

@@ -110,7 +110,9 @@ struct StatsRecord {
   std::size_t images = 0;        ///< searchable
   std::size_t words_points = 0;
   std::size_t words_lines = 0;
-  std::size_t bytes = 0;                  ///< held by the detector
+  std::size_t bytes = 0;                  ///< of the map in use
+  std::size_t budget_bytes = 0;           ///< of the map when it is full
+  Evictions evictions;                    ///< images forgotten since the map was empty
   std::uint64_t restamped = 0;            ///< frames whose time of capture had to be replaced
   std::uint64_t camera_losses = 0;        ///< times that the camera was lost
   std::optional<double> frame_rate_hz;    ///< of processed frames, since the previous record

@@ -2,62 +2,83 @@
 
 #include <algorithm>
 #include <cassert>
+#include <utility>
 
 namespace loopd {
 
-void InvertedFile::reserve(std::size_t id_limit, std::size_t extra) {
-  const std::size_t new_chunks = extra - std::min(extra, free_count_);
-  const std::size_t needed = chunks_.size() + new_chunks;
-  if (needed > chunks_.capacity()) chunks_.reserve(std::max(needed, 2 * chunks_.capacity()));
-  if (id_limit <= words_.size()) return;
-  if (id_limit > words_.capacity()) words_.reserve(std::max(id_limit, 2 * words_.capacity()));
-  words_.resize(id_limit);
+InvertedFile::InvertedFile(std::size_t words, std::size_t chunks) : words_(words), chunks_(chunks) {
+  static_assert(sizeof(Word) == 32 && sizeof(Chunk) == 64);
 }
 
-Posting& InvertedFile::last(Word& record) {
-  const std::uint32_t at = record.images - 1;
-  return at < kInline ? record.postings[at] : chunks_[record.tail].postings[place_in_chunk(at)];
+std::size_t InvertedFile::bytes_for(std::size_t words, std::size_t chunks) {
+  return FixedArray<Word>::bytes_for(words) + FixedArray<Chunk>::bytes_for(chunks);
 }
 
 std::uint32_t InvertedFile::take_chunk() noexcept {
-  if (free_ != kNone) {
-    const std::uint32_t taken = free_;
+  assert(free_chunks() > 0);
+  std::uint32_t taken = free_;
+  if (used_chunks_ < begun_) {
     free_ = chunks_[taken].next;
-    --free_count_;
-    chunks_[taken] = Chunk{};
-    return taken;
+  } else {
+    taken = begun_++;
   }
-  assert(chunks_.size() < chunks_.capacity());
-  chunks_.emplace_back();
-  return static_cast<std::uint32_t>(chunks_.size() - 1);
+  ++used_chunks_;
+  return taken;
 }
 
 void InvertedFile::add(std::uint32_t word, std::uint32_t image) noexcept {
-  assert(word < words_.size());
+  assert(image < Posting::kMaxImages);
   Word& record = words_[word];
   if (record.images > 0 && last(record).image == image) {
-    ++last(record).count;
+    if (last(record).count < Posting::kMaxCount) ++last(record).count;
     return;
   }
-  const std::uint32_t at = record.images++;
-  if (at >= kInline && place_in_chunk(at) == 0) {
+  if (record.images >= kInline && chained(record) % kInChunk == 0) {
     const std::uint32_t chunk = take_chunk();
-    (record.head == kNone ? record.head : chunks_[record.tail].next) = chunk;
-    record.tail = chunk;
+    chunks_[chunk].next = record.head;
+    record.head = chunk;
   }
-  last(record) = {image, 1};
+  ++record.images;
+  Posting& added = last(record);
+  added.image = image & (Posting::kMaxImages - 1);
+  added.count = 1;
 }
 
-void InvertedFile::remove(std::uint32_t word) noexcept {
-  assert(word < words_.size());
-  Word& record = words_[word];
-  if (record.head != kNone) {
-    const std::size_t chained = (record.images - kInline + kInChunk - 1) / kInChunk;
-    chunks_[record.tail].next = free_;
-    free_ = record.head;
-    free_count_ += chained;
+Posting* InvertedFile::find(Word& record, std::uint32_t image) {
+  const auto of_image = [image](const Posting& posting) { return posting.image == image; };
+  const auto inline_end = record.postings.begin() + std::min(record.images, kInline);
+  const auto found = std::find_if(record.postings.begin(), inline_end, of_image);
+  if (found != inline_end) return &*found;
+  std::uint32_t used = in_head(record);
+  for (std::uint32_t left = chained(record), at = record.head; left > 0; at = chunks_[at].next) {
+    auto& postings = chunks_[at].postings;
+    const auto end = postings.begin() + used;
+    const auto here = std::find_if(postings.begin(), end, of_image);
+    if (here != end) return &*here;
+    left -= used;
+    used = kInChunk;
   }
-  record = Word{};
+  return nullptr;
+}
+
+void InvertedFile::drop_last(Word& record) noexcept {
+  const bool empties_chunk = in_head(record) == 1;
+  --record.images;
+  if (!empties_chunk) return;
+  const std::uint32_t emptied = record.head;
+  record.head = chunks_[emptied].next;
+  chunks_[emptied].next = free_;
+  free_ = emptied;
+  --used_chunks_;
+}
+
+std::uint32_t InvertedFile::remove(std::uint32_t word, std::uint32_t image) noexcept {
+  Word& record = words_[word];
+  if (Posting* const posting = find(record, image)) {
+    *posting = last(record);
+    drop_last(record);
+  }
+  return record.images;
 }
 
 }  // namespace loopd

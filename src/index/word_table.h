@@ -29,6 +29,9 @@ namespace loopd {
 /// Thread: one caller at a time (look-ups use scratch memory).
 class WordTable {
  public:
+  explicit WordTable(std::size_t capacity = 0) { (void)capacity; }
+  static std::size_t bytes_for(std::size_t capacity) { return 168 * capacity; }
+
   /// Makes room for `extra` more words, so that as many insertions cannot fail, and chooses the key
   /// bits when it is time. Throws std::bad_alloc and then changes no result.
   void reserve(std::size_t extra);

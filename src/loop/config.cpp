@@ -1,5 +1,7 @@
 #include "loopd/config.h"
 
+#include "loopd/capacity.h"
+
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -169,6 +171,11 @@ std::vector<std::string> validate(const Config& config) {
     if (!(value >= parameter.min && value <= parameter.max))  // catches NaN as well
       violations.push_back(violation(parameter, value));
   }
+  if (violations.empty() && map_capacity(config).full_images < MapCapacity::kLeastImages)
+    violations.push_back(
+        "memory_budget_bytes = " + std::to_string(config.memory_budget_bytes) +
+        ". Violated constraint: memory_budget_bytes >= " + std::to_string(least_map_bytes(config)) +
+        ", a map of " + std::to_string(MapCapacity::kLeastImages) + " images");
   if (config.features.points == 0 && config.features.lines == 0)
     violations.push_back(
         "features.points = 0 and features.lines = 0. Violated constraint: one of them > 0");

@@ -9,6 +9,8 @@
 
 #include "features/feature_extractor.h"
 #include "index/vocabulary.h"
+#include "loop/capacity.h"
+#include "loop/eviction.h"
 #include "loop/fusion.h"
 #include "loop/islands.h"
 #include "loop/map.h"
@@ -36,6 +38,7 @@ class StageTimer {
   SteadyClock::time_point start_;
 };
 
+constexpr int kMaxEvictions = 2;                      // before an insertion: bounds its time
 constexpr int kMaxStillCredit = 10;                   // frames
 constexpr std::int64_t kMaxFrameNs = 10'000'000'000;  // a longer pause is no time under way
 
@@ -73,16 +76,6 @@ double conviction(const Verification& v) {
   return v.inliers() * std::sqrt(static_cast<double>(v.cells));
 }
 
-// A copy that holds no spare capacity: it stays for the life of the map.
-Features compact(const Features& features) {
-  Features copy = features;
-  copy.points.shrink_to_fit();
-  copy.point_descriptors.shrink_to_fit();
-  copy.lines.shrink_to_fit();
-  copy.line_descriptors.shrink_to_fit();
-  return copy;
-}
-
 }  // namespace
 
 class Detector::Impl {
@@ -91,12 +84,13 @@ class Detector::Impl {
       : config_(config),
         lanes_(lanes != nullptr ? *lanes : inline_lanes_),
         extractor_(config.features),
-        point_words_(config.index),
-        line_words_(config.index),
-        point_lane_verifier_(config.verify),
-        line_lane_verifier_(config.verify),
+        capacity_(map_layout(config)),
+        point_words_(config.index, capacity_.points),
+        line_words_(config.index, capacity_.lines),
+        point_lane_(config.verify),
+        line_lane_(config.verify),
         stillness_(config.loop),
-        map_(config.loop) {
+        map_(config.loop, capacity_.images, capacity_.blob_chunks) {
     assert(validate(config).empty());
   }
 
@@ -146,17 +140,21 @@ class Detector::Impl {
     report.words_lines = line_words_.words();
     report.images = map_.searchable();
     report.bytes = bytes();
+    report.evictions = evictions_;
   }
 
-  const Features* features(ImageId image) const {
+  const Features* features(ImageId image) {
     if (next_id_ > 0 && image == next_id_ - 1) return &features_;
     const MapImage* kept = map_.find(image);
-    return kept != nullptr ? &kept->features : nullptr;
+    if (kept == nullptr) return nullptr;
+    map_.load(*kept, shown_);
+    return &shown_;
   }
 
   std::size_t bytes() const {
-    return map_.bytes() + point_words_.bytes() + line_words_.bytes() + features_.bytes();
+    return map_.bytes_in_use() + point_words_.bytes_in_use() + line_words_.bytes_in_use();
   }
+  std::size_t capacity_bytes() const { return capacity_.bytes; }
 
  private:
   // One candidate of this frame and what its verification found.
@@ -165,6 +163,23 @@ class Detector::Impl {
     Candidate candidate;
     Verification found;
     InlierPairs pairs;
+  };
+
+  // What a lane needs of its own to verify trials.
+  struct VerifyLane {
+    explicit VerifyLane(const VerifyConfig& config) : verifier(config) {}
+    Verifier verifier;
+    Features candidate;
+  };
+
+  // The word numbers of one image.
+  struct ImageWords {
+    std::vector<WordId> points;
+    std::vector<WordId> lines;
+    void resize(std::size_t point_count, std::size_t line_count) {
+      points.resize(point_count);
+      lines.resize(line_count);
+    }
   };
 
   static void forget_evidence(Report& report) {
@@ -206,7 +221,7 @@ class Detector::Impl {
   // times, too).
   void notice_motion(Report& report) {
     const MapImage* newest = map_.newest();
-    report.still = newest != nullptr && stillness_.is_still(newest->features, features_);
+    report.still = newest != nullptr && stillness_.is_still(newest_features_, features_);
     pending_ = !report.still;
 
     const std::int64_t elapsed_ns = time_under_way(last_time_ns_, report.time_ns);
@@ -253,8 +268,7 @@ class Detector::Impl {
     const StageTimer timer(report.times.verify_ns);
     const std::uint64_t seed = seed_of(report.query);
     list_trials();
-    lanes_.run([&] { run_trials(0, seed, point_lane_verifier_); },
-               [&] { run_trials(1, seed, line_lane_verifier_); });
+    lanes_.run([&] { run_trials(0, seed, point_lane_); }, [&] { run_trials(1, seed, line_lane_); });
     const Trial& best = *std::max_element(
         trials_.begin(), trials_.begin() + static_cast<std::ptrdiff_t>(trial_count_),
         [](const Trial& a, const Trial& b) { return conviction(a.found) < conviction(b.found); });
@@ -282,11 +296,11 @@ class Detector::Impl {
   }
 
   // Every second trial, so that two lanes share the work; each is independent of all others.
-  void run_trials(std::size_t first, std::uint64_t seed, Verifier& verifier) {
+  void run_trials(std::size_t first, std::uint64_t seed, VerifyLane& lane) {
     for (std::size_t i = first; i < trial_count_; i += 2) {
       Trial& trial = trials_[i];
-      const Features& candidate = map_.find(trial.candidate.image)->features;
-      trial.found = verifier.verify(features_, candidate, seed, trial.pairs);
+      map_.load(*map_.find(trial.candidate.image), lane.candidate);
+      trial.found = lane.verifier.verify(features_, lane.candidate, seed, trial.pairs);
     }
   }
 
@@ -302,48 +316,133 @@ class Detector::Impl {
     return (static_cast<std::uint64_t>(config_.verify.seed) << 32U) + query;
   }
 
+  // Keeps the newest frame in the waiting window. It is given up if its room cannot be made in the
+  // time a frame has.
   void keep(const Report& report) {
-    map_.push({report.query, report.sequence, report.time_ns, clock_, compact(features_)});
+    for (int i = 0; i < kMaxEvictions && !map_.has_room(features_); ++i)
+      if (!make_room()) break;
+    if (!map_.has_room(features_)) {
+      ++evictions_.not_kept;
+      return;
+    }
+    MapImage image;
+    image.id = report.query;
+    image.sequence = report.sequence;
+    image.time_ns = report.time_ns;
+    image.taken = clock_;
+    image.revisit = report.outcome == Outcome::kLoop;
+    map_.push(image, features_);
+    newest_features_ = features_;
+    if (image.revisit && map_.find(report.match->image) != nullptr)
+      map_.note_revisit(report.match->image);
+  }
+
+  // Where frames come fast, a waiting window of many seconds holds more of one place than the map
+  // has room for: then every second one of it must do.
+  bool make_room() {
+    if (!map_.crowded_by_waiting() || !map_.thin_waiting()) return evict(evictions_.for_images);
+    ++evictions_.waiting;
+    return true;
+  }
+
+  // Forgets the searchable image worth least.
+  bool evict(std::uint64_t& reason) {
+    const auto position = least_worth(map_.searchable_images());
+    if (!position) return false;
+    const MapImage& image = map_.at(*position);
+    leaving_.resize(image.points, image.lines);
+    map_.load_words(image, leaving_.points, leaving_.lines);
+    point_words_.remove(image.id, leaving_.points);
+    line_words_.remove(image.id, leaving_.lines);
+    map_.remove(*position);
+    ++reason;
+    return true;
   }
 
   // 8. At most two images a frame, so that a frame's time stays bounded after a pause.
   void admit_ready() {
     const WaitingClock next{clock_.frames + 1, clock_.ns};
-    for (int i = 0; i < 2; ++i) {
-      const MapImage* image = map_.ready(next);
-      if (image == nullptr) return;
-      lanes_.run(
-          [&] { add_once(point_words_, *image, image->features.point_descriptors, in_points_); },
-          [&] { add_once(line_words_, *image, image->features.line_descriptors, in_lines_); });
-      map_.admit();
-    }
+    for (int i = 0; i < 2 && map_.ready(next) != nullptr; ++i) admit(*map_.ready(next));
   }
 
+  // The image's features become words, which makes it searchable; words that were new a while ago
+  // and are still its own alone are deleted.
+  void admit(const MapImage& waiting) {
+    const ImageId id = waiting.id;
+    map_.load(waiting, admitted_);
+    for (int i = 0; i < kMaxEvictions && !words_have_room(admitted_); ++i)
+      if (!evict(evictions_.for_words)) break;
+    admitted_words_.resize(admitted_.points.size(), admitted_.lines.size());
+    lanes_.run(
+        [&] {
+          add_once(point_words_, id, admitted_.point_descriptors, admitted_words_.points,
+                   in_points_);
+        },
+        [&] {
+          add_once(line_words_, id, admitted_.line_descriptors, admitted_words_.lines, in_lines_);
+        });
+    const auto features = static_cast<double>(admitted_.points.size() + admitted_.lines.size());
+    const auto shared = static_cast<double>(in_points_.shared + in_lines_.shared);
+    map_.admit(1 - shared / features);
+    const MapImage& image = *map_.find(id);
+    map_.store_words(image, admitted_words_.points, admitted_words_.lines);
+    end_probation();
+  }
+
+  bool words_have_room(const Features& features) const {
+    return point_words_.has_room(features.points.size()) &&
+           line_words_.has_room(features.lines.size());
+  }
+
+  void end_probation() {
+    const auto probation = static_cast<std::size_t>(config_.index.probation_images);
+    if (probation == 0 || map_.searchable() <= probation) return;
+    const MapImage& image = map_.at(map_.searchable() - 1 - probation);
+    leaving_.resize(image.points, image.lines);
+    map_.load_words(image, leaving_.points, leaving_.lines);
+    point_words_.end_probation(image.id, leaving_.points);
+    line_words_.end_probation(image.id, leaving_.lines);
+    map_.store_words(image, leaving_.points, leaving_.lines);
+  }
+
+  // The newest image of a vocabulary.
+  struct Newest {
+    std::optional<ImageId> image;
+    std::size_t shared = 0;  // of its descriptors, with the image before
+  };
+
   // If one lane fails, the image waits and the next attempt adds it only where it is missing.
-  static void add_once(Vocabulary& words, const MapImage& image,
-                       const std::vector<Descriptor>& descriptors, std::optional<ImageId>& newest) {
-    if (newest == image.id) return;
-    words.add(image.id, descriptors);
-    newest = image.id;
+  static void add_once(Vocabulary& words, ImageId image, std::span<const Descriptor> descriptors,
+                       std::span<WordId> numbers, Newest& newest) {
+    if (newest.image == image) return;
+    newest.shared = words.add(image, descriptors, numbers);
+    newest.image = image;
   }
 
   Config config_;
   InlineLanes inline_lanes_;
   LaneExecutor& lanes_;
   FeatureExtractor extractor_;
+  const MapLayout capacity_;
   Vocabulary point_words_;
   Vocabulary line_words_;
-  Verifier point_lane_verifier_;
-  Verifier line_lane_verifier_;
+  VerifyLane point_lane_;
+  VerifyLane line_lane_;
   StillnessTest stillness_;
   ImageMap map_;
 
   ImageId next_id_ = 0;
-  Features features_;     // of the newest frame
+  Features features_;         // of the newest frame
+  Features newest_features_;  // of the newest image kept
+  Features shown_;            // what features() was asked for
+  Features admitted_;         // of the image that becomes searchable, and its words
+  ImageWords admitted_words_;
+  ImageWords leaving_;  // words of an image that is evicted or whose probation ends
+  Evictions evictions_;
   bool pending_ = false;  // the newest frame waits for absorb() to keep it
   std::optional<std::int64_t> last_time_ns_;
-  std::optional<ImageId> in_points_;  // the newest image of each vocabulary
-  std::optional<ImageId> in_lines_;
+  Newest in_points_;
+  Newest in_lines_;
   int still_credit_ = 0;
   WaitingClock clock_;
   std::optional<Island> priority_;
@@ -372,7 +471,8 @@ void Detector::process(const Features& features, std::uint64_t sequence,
   impl_->process(features, sequence, time_ns, report);
 }
 void Detector::absorb(Report& report) { impl_->absorb(report); }
-const Features* Detector::features(ImageId image) const { return impl_->features(image); }
+const Features* Detector::features(ImageId image) { return impl_->features(image); }
 std::size_t Detector::bytes() const { return impl_->bytes(); }
+std::size_t Detector::capacity_bytes() const { return impl_->capacity_bytes(); }
 
 }  // namespace loopd

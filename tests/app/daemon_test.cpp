@@ -153,8 +153,8 @@ TEST_F(DaemonTest, CheckPrintsTheConfigAndItsMemory) {
   EXPECT_EQ(run({"--check", "--set", "camera.path=/data", "--set", "camera.buffers=5"}), 0);
   const std::string text = daemon_->standard_output();
   EXPECT_THAT(text, HasSubstr("buffers = 5\n"));
-  EXPECT_THAT(text, HasSubstr("# memory, fixed: "));
-  EXPECT_THAT(text, HasSubstr("frame buffers         60.0 MiB"));
+  EXPECT_THAT(text, HasSubstr("# memory, all:            256.0 MiB"));
+  EXPECT_THAT(text, HasSubstr("frame buffers         40.0 MiB"));
   EXPECT_TRUE(parse_config(text, "check", {}).ok()) << "the output is a config file again";
 }
 

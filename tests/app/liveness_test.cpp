@@ -78,7 +78,10 @@ TEST(MemoryPlan, AddsUpWhatTheConfigAsksFor) {
   const MemoryPlan plan = memory_plan(config);
   EXPECT_EQ(plan.frame_buffers, 3u << 20);
   EXPECT_EQ(plan.client_queues, 1u << 20);
-  EXPECT_EQ(plan.image_features, 48'000u);
+  EXPECT_EQ(plan.budget, 256u << 20);
+  EXPECT_LE(plan.fixed() + plan.map.bytes, plan.budget);
+  EXPECT_GT(plan.fixed() + plan.map.bytes, plan.budget - (8u << 20));
+  EXPECT_GT(plan.map.full_images, 500u);
   EXPECT_NE(memory_text(plan).find("frame buffers         3.0 MiB"), std::string::npos);
 }
 

@@ -191,6 +191,8 @@ TEST(Records, StatsTextIsTheDocumentedOne) {
   record.loops = 7;
   record.candidates = 8;
   record.images = 9;
+  record.budget_bytes = 17;
+  record.evictions = {18, 19, 20, 21};
   record.words_points = 10;
   record.words_lines = 11;
   record.bytes = 12;
@@ -201,7 +203,8 @@ TEST(Records, StatsTextIsTheDocumentedOne) {
   EXPECT_EQ(stats_text(record, {13, 14}, kPosition, true),
             R"({"class":"stats","seq":413,"epoch":"e1","repeat":true,"time_ns":1,"uptime_ns":2,)"
             R"("frames":3,"dropped":4,"corrupt":5,"errors":6,"loops":7,"candidates":8,"images":9,)"
-            R"("words_points":10,"words_lines":11,"bytes":12,"restamped":15,"camera_losses":16,)"
+            R"("words_points":10,"words_lines":11,"bytes":12,"budget_bytes":17,)"
+            R"("evicted":{"for_images":18,"for_words":19,"waiting":20,"not_kept":21},"restamped":15,"camera_losses":16,)"
             R"("frame_rate_hz":12.5,)"
             R"("mean_us":{"features":1,"search":2,"verify":3,"update":4,"total":10},)"
             R"("clients":13,"missed_records":14})");

@@ -2,85 +2,94 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
+#include <vector>
 
 #include "support/descriptor_samples.h"
 
 namespace loopd {
 namespace {
 
-std::vector<Posting> postings(const InvertedFile& file, std::uint32_t word) {
-  std::vector<Posting> all;
-  file.for_each(word, [&](const Posting& posting) { all.push_back(posting); });
+using Counts = std::map<std::uint32_t, std::uint32_t>;  // by image
+
+Counts postings(const InvertedFile& file, std::uint32_t word) {
+  Counts all;
+  file.for_each(word, [&](const Posting& posting) {
+    EXPECT_TRUE(all.emplace(posting.image, posting.count).second) << "an image twice";
+  });
+  EXPECT_EQ(all.size(), file.images(word));
   return all;
 }
 
-TEST(InvertedFile, AnUnknownWordIsInNoImage) {
-  const InvertedFile file;
+TEST(InvertedFile, AnUnusedWordIsInNoImage) {
+  const InvertedFile file(8, 0);
   EXPECT_EQ(file.images(7), 0u);
   EXPECT_TRUE(postings(file, 7).empty());
+  EXPECT_FALSE(file.last_is(7, 0));
 }
 
 TEST(InvertedFile, CountsAWordSeenTwiceInOneImage) {
-  InvertedFile file;
-  file.reserve(1, 4);
+  InvertedFile file(1, 4);
   file.add(0, 5);
   file.add(0, 5);
   file.add(0, 9);
-  EXPECT_EQ(file.images(0), 2u);
-  EXPECT_EQ(postings(file, 0), (std::vector<Posting>{{5, 2}, {9, 1}}));
+  EXPECT_EQ(postings(file, 0), (Counts{{5, 2}, {9, 1}}));
+  EXPECT_TRUE(file.last_is(0, 9));
+  EXPECT_FALSE(file.last_is(0, 5));
 }
 
-TEST(InvertedFile, KeepsTheOrderOfImagesAcrossAnyNumberOfChunks) {
-  InvertedFile file;
+TEST(InvertedFile, HoldsAnyNumberOfImages) {
   for (std::uint32_t images = 1; images <= 100; ++images) {
-    const std::uint32_t word = images;
-    file.reserve(word + 1, 2 * images);
-    std::vector<Posting> expected;
+    InvertedFile file(1, 8);
+    Counts expected;
     for (std::uint32_t image = 0; image < images; ++image) {
-      file.add(word, image * 3);
-      file.add(word, image * 3);
-      expected.push_back({image * 3, 2});
+      file.add(0, image * 3);
+      file.add(0, image * 3);
+      expected[image * 3] = 2;
     }
-    ASSERT_EQ(postings(file, word), expected);
+    ASSERT_EQ(postings(file, 0), expected);
+    ASSERT_TRUE(file.last_is(0, (images - 1) * 3));
   }
 }
 
-TEST(InvertedFile, IsAMapOfListsUnderAnyMixOfAddAndRemove) {
+TEST(InvertedFile, HoldsTheLargestImageNumberAndTheLargestCount) {
+  InvertedFile file(1, 1);
+  for (std::uint32_t i = 0; i < Posting::kMaxCount + 5; ++i) file.add(0, Posting::kMaxImages - 1);
+  EXPECT_EQ(postings(file, 0), (Counts{{Posting::kMaxImages - 1, Posting::kMaxCount}}));
+}
+
+TEST(InvertedFile, IsAMapOfCountsUnderAnyMixOfAddAndRemove) {
+  constexpr std::uint32_t kWords = 40;
   DescriptorSamples samples(6);
-  InvertedFile file;
-  std::map<std::uint32_t, std::vector<Posting>> expected;
-  for (std::uint32_t image = 0; image < 400; ++image) {
-    file.reserve(40, 60);
+  InvertedFile file(kWords, 400);
+  std::map<std::uint32_t, Counts> expected;
+  for (std::uint32_t image = 0; image < 1000; ++image) {
     for (int i = 0; i < 60; ++i) {
-      const std::uint32_t word = samples.below(samples.below(40) + 1);
+      const std::uint32_t word = samples.below(samples.below(kWords) + 1);
       file.add(word, image);
-      auto& list = expected[word];
-      if (list.empty() || list.back().image != image) list.push_back({image, 0});
-      ++list.back().count;
+      ++expected[word][image];
     }
-    const std::uint32_t gone = samples.below(40);
-    file.remove(gone);
-    expected.erase(gone);
-    for (std::uint32_t word = 0; word < 40; ++word) {
-      ASSERT_EQ(file.images(word), expected[word].size());
-      ASSERT_EQ(postings(file, word), expected[word]);
+    // Some 60 images stay; now and then a word is emptied altogether.
+    for (std::uint32_t word = 0; word < kWords; ++word) {
+      Counts& counts = expected[word];
+      const bool all = samples.below(50) == 0;
+      while (!counts.empty() && (all || counts.size() > 60 || samples.below(4) == 0)) {
+        const auto gone =
+            std::next(counts.begin(), samples.below(static_cast<std::uint32_t>(counts.size())));
+        ASSERT_EQ(file.remove(word, gone->first), counts.size() - 1);
+        counts.erase(gone);
+      }
+      ASSERT_EQ(file.remove(word, image + 1), counts.size()) << "an image it was never in";
+      ASSERT_EQ(postings(file, word), counts);
     }
   }
-}
-
-TEST(InvertedFile, UsesTheChunksOfDeletedWordsAgain) {
-  InvertedFile file;
-  std::size_t bytes_after_first_round = 0;
-  for (int round = 0; round < 20; ++round) {
-    for (std::uint32_t word = 0; word < 10; ++word) {
-      file.reserve(10, 50);
-      for (std::uint32_t image = 0; image < 50; ++image) file.add(word, image);
+  for (std::uint32_t word = 0; word < kWords; ++word)
+    while (!expected[word].empty()) {
+      file.remove(word, expected[word].begin()->first);
+      expected[word].erase(expected[word].begin());
     }
-    if (round == 0) bytes_after_first_round = file.bytes();
-    for (std::uint32_t word = 0; word < 10; ++word) file.remove(word);
-  }
-  EXPECT_EQ(file.bytes(), bytes_after_first_round);
+  EXPECT_EQ(file.free_chunks(), 400u) << "chunks were lost";
 }
 
 }  // namespace

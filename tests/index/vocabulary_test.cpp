@@ -82,9 +82,62 @@ class ReferenceVocabulary {
   int added_ = 0;
 };
 
-std::vector<Candidate> search(Vocabulary& vocabulary, const std::vector<Descriptor>& query) {
+constexpr VocabularyCapacity kRoomy{
+    .images = 1000, .words = 50'000, .posting_chunks = 20'000, .descriptors = 2000};
+
+// A vocabulary with what its user keeps: the words of each image.
+class Kept {
+ public:
+  explicit Kept(const IndexConfig& config, const VocabularyCapacity& capacity = kRoomy)
+      : config_(config), vocabulary_(config, capacity) {}
+
+  // As the detector does it: words that were new `probation_images` images ago end their probation.
+  std::size_t add(ImageId image, const std::vector<Descriptor>& descriptors) {
+    Image& added = images_.emplace_back(image, std::vector<WordId>(descriptors.size()));
+    const std::size_t shared = vocabulary_.add(image, descriptors, added.words);
+    const auto probation = static_cast<std::size_t>(config_.probation_images);
+    if (probation == 0 || images_.size() <= probation) return shared;
+    Image& judged = images_[images_.size() - 1 - probation];
+    vocabulary_.end_probation(judged.id, judged.words);
+    return shared;
+  }
+
+  void remove(std::size_t position) {
+    vocabulary_.remove(images_[position].id, images_[position].words);
+    images_.erase(images_.begin() + static_cast<std::ptrdiff_t>(position));
+  }
+
+  // What the vocabulary says of each word is what the images hold, and there is no other word.
+  void expect_consistent() const {
+    std::map<WordId, std::map<ImageId, std::size_t>> held;
+    for (const Image& image : images_)
+      for (const WordId word : image.words)
+        if (word != kNoWord) ++held[word][image.id];
+    ASSERT_EQ(vocabulary_.words(), held.size());
+    ASSERT_EQ(vocabulary_.images(), images_.size());
+    for (const auto& [word, in] : held) {
+      ASSERT_EQ(vocabulary_.images_of(word), in.size());
+      for (const auto& [image, count] : in) ASSERT_EQ(vocabulary_.count_in(word, image), count);
+    }
+  }
+
+  Vocabulary& vocabulary() { return vocabulary_; }
+  std::size_t words() const { return vocabulary_.words(); }
+  std::size_t images() const { return images_.size(); }
+
+ private:
+  struct Image {
+    ImageId id;
+    std::vector<WordId> words;
+  };
+  IndexConfig config_;
+  Vocabulary vocabulary_;
+  std::vector<Image> images_;
+};
+
+std::vector<Candidate> search(Kept& kept, const std::vector<Descriptor>& query) {
   std::vector<Candidate> candidates{{77, 7.0}};  // must be cleared
-  vocabulary.search(query, candidates);
+  kept.vocabulary().search(query, candidates);
   return candidates;
 }
 
@@ -135,7 +188,7 @@ void expect_sorted(const std::vector<Candidate>& candidates) {
 }
 
 TEST(Vocabulary, EmptyFindsNothing) {
-  Vocabulary vocabulary{IndexConfig{}};
+  Kept vocabulary{IndexConfig{}};
   EXPECT_TRUE(search(vocabulary, far_words(5)).empty());
   EXPECT_TRUE(search(vocabulary, {}).empty());
   EXPECT_EQ(vocabulary.words(), 0u);
@@ -144,7 +197,7 @@ TEST(Vocabulary, EmptyFindsNothing) {
 
 TEST(Vocabulary, ScoresAreTfIdf) {
   const auto w = far_words(5);
-  Vocabulary vocabulary{IndexConfig{}};
+  Kept vocabulary{IndexConfig{}};
   vocabulary.add(3, std::vector<Descriptor>{w[0], w[1]});
   vocabulary.add(5, std::vector<Descriptor>{w[0], w[2], w[2], w[3]});
   vocabulary.add(9, std::vector<Descriptor>{w[4]});
@@ -167,7 +220,7 @@ TEST(Vocabulary, ScoresAreTfIdf) {
 
 TEST(Vocabulary, AWordInEveryImageStillNamesThem) {
   const auto w = far_words(1);
-  Vocabulary vocabulary{IndexConfig{}};
+  Kept vocabulary{IndexConfig{}};
   for (ImageId image = 0; image < 80; ++image) vocabulary.add(image, w);
   const auto candidates = search(vocabulary, w);
   ASSERT_EQ(candidates.size(), 80u);
@@ -180,7 +233,7 @@ TEST(Vocabulary, AWordInEveryImageStillNamesThem) {
 
 TEST(Vocabulary, AFirstImageWithoutFeaturesCounts) {
   const auto w = far_words(2);
-  Vocabulary vocabulary{IndexConfig{}};
+  Kept vocabulary{IndexConfig{}};
   vocabulary.add(0, {});
   EXPECT_TRUE(search(vocabulary, w).empty());
   vocabulary.add(1, w);
@@ -194,7 +247,7 @@ TEST(Vocabulary, AFirstImageWithoutFeaturesCounts) {
 TEST(Vocabulary, WithoutASecondWordTheDistanceAloneDecides) {
   IndexConfig config;
   config.max_word_distance = 10;
-  Vocabulary vocabulary{config};
+  Kept vocabulary{config};
   vocabulary.add(0, std::vector<Descriptor>(1));
   EXPECT_EQ(search(vocabulary, {Descriptor{{0x3ff, 0, 0, 0}}}).size(), 1u);  // 10 bits
   EXPECT_TRUE(search(vocabulary, {Descriptor{{0x7ff, 0, 0, 0}}}).empty());   // 11
@@ -203,7 +256,7 @@ TEST(Vocabulary, WithoutASecondWordTheDistanceAloneDecides) {
 TEST(Vocabulary, TheRatioDecidesBetweenTwoWords) {
   IndexConfig config;
   config.word_ratio = 0.5;
-  Vocabulary vocabulary{config};
+  Kept vocabulary{config};
   const Descriptor a{};
   const Descriptor b{{0xffffff, 0, 0, 0}};  // 24 bits from a
   vocabulary.add(0, std::vector<Descriptor>{a});
@@ -225,7 +278,7 @@ TEST(Vocabulary, WhatRepeatsWithinAnImageBecomesOneWord) {
   const auto w = far_words(2);
   std::vector<Descriptor> image{w[0], w[1]};
   for (int i = 0; i < 20; ++i) image.push_back(samples.noisy(w[0], 12));
-  Vocabulary vocabulary{IndexConfig{}};
+  Kept vocabulary{IndexConfig{}};
   vocabulary.add(0, image);
   EXPECT_EQ(vocabulary.words(), 2u);
 }
@@ -234,7 +287,7 @@ TEST(Vocabulary, AWordNotSeenAgainInTimeIsDeleted) {
   const auto w = far_words(6);
   IndexConfig config;
   config.probation_images = 2;
-  Vocabulary vocabulary{config};
+  Kept vocabulary{config};
   vocabulary.add(0, std::vector<Descriptor>{w[0], w[1], w[1]});
   vocabulary.add(1, std::vector<Descriptor>{w[2]});
   EXPECT_EQ(vocabulary.words(), 3u);
@@ -262,7 +315,7 @@ TEST(Vocabulary, AWordNotSeenAgainInTimeIsDeleted) {
 TEST(Vocabulary, WithoutProbationNothingIsDeleted) {
   IndexConfig config;
   config.probation_images = 0;
-  Vocabulary vocabulary{config};
+  Kept vocabulary{config};
   vocabulary.add(0, far_words(50));
   for (ImageId image = 1; image < 200; ++image) vocabulary.add(image, {});
   EXPECT_EQ(vocabulary.words(), 50u);
@@ -272,7 +325,7 @@ TEST(Vocabulary, IsTheReferenceWhileLookUpsAreExact) {
   for (const int probation : {0, 1, 5}) {
     IndexConfig config;
     config.probation_images = probation;
-    Vocabulary vocabulary{config};
+    Kept vocabulary{config};
     ReferenceVocabulary reference(config);
     const auto images = walk(60, 20, 30);
     for (std::size_t i = 0; i < images.size(); ++i) {
@@ -289,7 +342,7 @@ TEST(Vocabulary, IsTheReferenceWhileLookUpsAreExact) {
 TEST(Vocabulary, FindsThePlaceAmongManyWords) {
   IndexConfig config;
   config.probation_images = 0;
-  Vocabulary vocabulary{config};
+  Kept vocabulary{config};
   const std::size_t places = 80;
   const auto images = walk(2 * places, places, 100);
   std::size_t right = 0;
@@ -305,9 +358,9 @@ TEST(Vocabulary, FindsThePlaceAmongManyWords) {
 
 TEST(Vocabulary, AnotherVocabularyChangesNothing) {
   const auto images = walk(60, 20, 100);
-  Vocabulary alone{IndexConfig{}};
-  Vocabulary beside{IndexConfig{}};
-  Vocabulary other{IndexConfig{}};
+  Kept alone{IndexConfig{}};
+  Kept beside{IndexConfig{}};
+  Kept other{IndexConfig{}};
   for (std::size_t i = 0; i < images.size(); ++i) {
     alone.add(static_cast<ImageId>(i), images[i]);
     beside.add(static_cast<ImageId>(i), images[i]);
@@ -321,11 +374,11 @@ TEST(Vocabulary, AnotherVocabularyChangesNothing) {
       ASSERT_EQ(one[k].score, two[k].score);  // bit for bit
     }
   }
-  EXPECT_EQ(alone.bytes(), beside.bytes());
+  EXPECT_EQ(alone.vocabulary().bytes_in_use(), beside.vocabulary().bytes_in_use());
 }
 
 TEST(Vocabulary, IdenticalImagesDoNotGrowIt) {
-  Vocabulary vocabulary{IndexConfig{}};
+  Kept vocabulary{IndexConfig{}};
   const auto image = walk(1, 1, 200)[0];
   vocabulary.add(0, image);
   const std::size_t words = vocabulary.words();
@@ -334,9 +387,80 @@ TEST(Vocabulary, IdenticalImagesDoNotGrowIt) {
   expect_sorted(search(vocabulary, image));
 }
 
+TEST(Vocabulary, SaysHowMuchAnImageSharesWithTheOneBefore) {
+  const auto w = far_words(6);
+  Kept vocabulary{IndexConfig{}};
+  EXPECT_EQ(vocabulary.add(0, {w[0], w[1]}), 0u);
+  EXPECT_EQ(vocabulary.add(1, {w[1], w[1], w[2]}), 2u);
+  EXPECT_EQ(vocabulary.add(2, {w[0], w[3]}), 0u) << "w0 is in an image, but not in the one before";
+  EXPECT_EQ(vocabulary.add(3, {w[0], w[3], w[4]}), 2u);
+}
+
+TEST(Vocabulary, ARemovedImageIsFoundNoMoreAndItsOwnWordsAreGone) {
+  const auto w = far_words(3);
+  Kept vocabulary{IndexConfig{}};
+  vocabulary.add(0, {w[0], w[1]});
+  vocabulary.add(1, {w[1], w[2]});
+  vocabulary.remove(0);
+  EXPECT_EQ(vocabulary.words(), 2u);
+  EXPECT_TRUE(search(vocabulary, {w[0]}).empty());
+  ASSERT_EQ(search(vocabulary, {w[1]}).size(), 1u);
+  EXPECT_EQ(search(vocabulary, {w[1]})[0].image, 1u);
+  vocabulary.expect_consistent();
+  vocabulary.remove(0);
+  EXPECT_EQ(vocabulary.words(), 0u);
+  EXPECT_TRUE(search(vocabulary, {w[1]}).empty());
+}
+
+TEST(Vocabulary, CountsOfAWordAreAlwaysWhatTheImagesHold) {
+  for (const int probation : {0, 1, 4}) {
+    IndexConfig config;
+    config.probation_images = probation;
+    Kept vocabulary{config};
+    DescriptorSamples samples(5);
+    const auto images = walk(300, 12, 40);
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      vocabulary.add(static_cast<ImageId>(i), images[i]);
+      while (vocabulary.images() > 30 || (vocabulary.images() > 0 && samples.below(3) == 0))
+        vocabulary.remove(samples.below(static_cast<std::uint32_t>(vocabulary.images())));
+      vocabulary.expect_consistent();
+    }
+  }
+}
+
+TEST(Vocabulary, WithoutRoomForNewWordsAnImageKeepsThoseItMatches) {
+  const auto w = far_words(12);
+  const VocabularyCapacity small{.images = 3, .words = 8, .posting_chunks = 16, .descriptors = 8};
+  Kept vocabulary{IndexConfig{}, small};
+  vocabulary.add(0, {w[0], w[1], w[2], w[3], w[4]});
+  vocabulary.add(1, {w[0], w[5], w[6], w[7], w[8], w[9]});
+  EXPECT_EQ(vocabulary.words(), 8u);
+  EXPECT_EQ(vocabulary.vocabulary().words_refused(), 2u);
+  EXPECT_EQ(search(vocabulary, {w[0]}).size(), 2u);
+  EXPECT_EQ(search(vocabulary, {w[7]}).size(), 1u);
+  EXPECT_TRUE(search(vocabulary, {w[9]}).empty());
+  vocabulary.expect_consistent();
+  vocabulary.remove(0);  // makes room again
+  vocabulary.add(2, {w[10], w[11]});
+  EXPECT_EQ(search(vocabulary, {w[11]}).size(), 1u);
+  vocabulary.expect_consistent();
+}
+
+TEST(Vocabulary, SaysWhetherThereIsRoomForAnImage) {
+  const VocabularyCapacity small{.images = 2, .words = 8, .posting_chunks = 5, .descriptors = 8};
+  Kept vocabulary{IndexConfig{}, small};
+  EXPECT_TRUE(vocabulary.vocabulary().has_room(5));
+  EXPECT_FALSE(vocabulary.vocabulary().has_room(6)) << "each may need a chunk of postings";
+  vocabulary.add(0, far_words(2));
+  vocabulary.add(1, far_words(2));
+  EXPECT_FALSE(vocabulary.vocabulary().has_room(1)) << "two images are all";
+  vocabulary.remove(1);
+  EXPECT_TRUE(vocabulary.vocabulary().has_room(1));
+}
+
 TEST(VocabularyDeathTest, IdsMustGrow) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");
-  Vocabulary vocabulary{IndexConfig{}};
+  Kept vocabulary{IndexConfig{}};
   vocabulary.add(4, {});
   EXPECT_DEATH(vocabulary.add(4, {}), "");
 }

@@ -77,9 +77,13 @@ TEST(DoctorConfig, MemoryIsTheUnitsOrTheMachines) {
   EXPECT_THAT(judge_memory(config, std::nullopt, 2 * kGib).text, HasSubstr("of this machine"));
   EXPECT_THAT(judge_memory(config, 9 * kGib, 2 * kGib).text, HasSubstr("2048 MiB of this machine"));
   const Finding tight = judge_memory(config, kGib / 4, 8 * kGib);
-  EXPECT_EQ(tight.level, Level::kWarning);
+  EXPECT_EQ(tight.level, Level::kProblem);
   EXPECT_THAT(tight.remedy, HasSubstr("MemoryMax"));
-  EXPECT_EQ(judge_memory(config, kGib / 16, 8 * kGib).level, Level::kProblem);
+  EXPECT_THAT(judge_memory(config, std::nullopt, kGib / 4).remedy, Not(HasSubstr("MemoryMax")));
+  DaemonConfig small;
+  small.memory.budget_mib = 96;
+  EXPECT_EQ(judge_memory(small, kGib / 4, 8 * kGib).level, Level::kWarning);
+  EXPECT_THAT(judge_memory(small, kGib / 4, 8 * kGib).remedy, HasSubstr("memory.budget_mib"));
 }
 
 // --- permissions

@@ -14,8 +14,8 @@ namespace {
 
 /// The program itself and its libraries, before the first frame, and their buffers while it works.
 constexpr std::uint64_t kProcessBytes = std::uint64_t{96} << 20;
-/// A map that ends sooner is of little use: about two minutes of driving.
-constexpr std::uint64_t kFewImages = 1000;
+/// With fewer images a map covers a room or two.
+constexpr std::uint64_t kFewImages = 200;
 
 Finding missing_file(const std::string& path, int code) {
   if (code == EACCES)
@@ -72,26 +72,25 @@ Findings judge_device_classes(const std::string& proc_devices, const std::string
 
 Finding judge_memory(const DaemonConfig& config, std::optional<std::uint64_t> memory_max,
                      std::uint64_t machine_bytes) {
-  const MemoryPlan plan = memory_plan(config);
   const bool by_unit = memory_max && *memory_max < machine_bytes;
   const std::uint64_t limit = by_unit ? *memory_max : machine_bytes;
-  const std::uint64_t fixed = plan.fixed() + kProcessBytes;
+  const MemoryPlan plan = memory_plan(config);
+  const std::uint64_t needed = plan.budget + kProcessBytes;
   const std::string of = mib_text(limit) + (by_unit ? " that the unit allows" : " of this machine");
-  const std::string remedy =
-      std::string(by_unit ? "raise MemoryMax= (systemctl edit), or lower " : "lower ") +
-      "features.points, camera.max_pixels or events.max_clients";
-  if (limit <= fixed)
+  const std::string remedy = by_unit
+                                 ? "raise MemoryMax= (systemctl edit), or lower memory.budget_mib"
+                                 : "lower memory.budget_mib";
+  if (limit < needed)
     return Finding::problem("memory",
-                            mib_text(fixed) +
-                                " are needed without any image, more than "
-                                "the " +
-                                of,
+                            mib_text(needed) +
+                                " may be needed, memory.budget_mib and the program " +
+                                "itself, more than the " + of,
                             remedy);
-  const std::uint64_t images = (limit - fixed) / std::max<std::size_t>(plan.per_image(), 1);
-  const std::string text =
-      "the " + of + " have room for at least " + std::to_string(images) + " images in the map";
-  return images < kFewImages ? Finding::warning("memory", text, remedy)
-                             : Finding::ok("memory", text);
+  const std::string text = mib_text(needed) + " of the " + of + "; the map has room for " +
+                           std::to_string(plan.map.full_images) + " images and more";
+  return plan.map.full_images < kFewImages
+             ? Finding::warning("memory", text, "raise memory.budget_mib")
+             : Finding::ok("memory", text);
 }
 
 }  // namespace loopd::loopctl

@@ -5,6 +5,7 @@
 #include <utility>
 #include <variant>
 
+#include "app/memory_plan.h"
 #include "base/clock.h"
 #include "capture/file_camera.h"
 #include "capture/folder_source.h"
@@ -63,7 +64,7 @@ Evaluation::Evaluation(const DaemonConfig& config, Parts parts)
       pool_(std::move(parts.pool)),
       camera_(std::move(parts.camera)),
       lanes_(std::move(parts.lanes)),
-      detector_(config.detector, lanes_.get()) {
+      detector_(detector_config(config), lanes_.get()) {
   summary_.source = camera_->describe();
 }
 
