@@ -162,8 +162,7 @@ void append_corners(const std::uint8_t* kept, std::size_t count, int first_x, in
     std::memcpy(&eight, kept + x, 8);
     while (eight != 0) {
       const int byte = std::countr_zero(eight) / 8;
-      corners.push_back({static_cast<std::int16_t>(first_x + static_cast<int>(x) + byte),
-                         static_cast<std::int16_t>(y),
+      corners.push_back({first_x + static_cast<int>(x) + byte, y,
                          static_cast<float>((eight >> (8 * byte)) & 0xff)});
       eight &= ~(std::uint64_t{0xff} << (8 * byte));
     }
@@ -175,7 +174,6 @@ void append_corners(const std::uint8_t* kept, std::size_t count, int first_x, in
 void FastCorners::find(const LumaView& image, int border_px, int threshold,
                        std::vector<Corner>& corners) {
   assert(border_px >= 16 && threshold >= 1 && threshold <= 254);
-  assert(image.width_px <= INT16_MAX && image.height_px <= INT16_MAX);
   corners.clear();
   if (std::min(image.width_px, image.height_px) <= 2 * border_px) return;
   const Form form = form_of(form_);

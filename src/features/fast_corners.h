@@ -10,8 +10,8 @@ namespace loopd {
 
 /// A corner of one pyramid level, in its pixels.
 struct Corner {
-  std::int16_t x_px = 0;
-  std::int16_t y_px = 0;
+  std::int32_t x_px = 0;
+  std::int32_t y_px = 0;
   float score = 0;  ///< >= 0, the larger the better
 };
 

@@ -22,7 +22,7 @@ class PointExtractor {
 
   /// Replaces `points` and `descriptors` by those of `image`, at most `features.points` (none if it
   /// is smaller than the described patch and its borders), by level and then in reading order.
-  /// Coordinates are in pixels of `image`; its sides are at most 32767 pixels.
+  /// Coordinates are in pixels of `image`.
   void extract(const LumaView& image, std::vector<Point>& points,
                std::vector<Descriptor>& descriptors);
 

@@ -40,8 +40,8 @@ TEST(ScoreByHarris, IsTheMeasureInEveryForm) {
   for (const Image& image : {with_noise(wall_image(1, 0, 60, 60), 10, 1), hardest, Image(60, 60)})
     for (const SimdForm form : simd_forms()) {
       std::vector<Corner> corners;
-      for (std::int16_t y = 6; y < 54; ++y)
-        for (std::int16_t x = 6; x < 54; ++x) corners.push_back({x, y, 0});
+      for (int y = 6; y < 54; ++y)
+        for (int x = 6; x < 54; ++x) corners.push_back({x, y, 0});
       score_by_harris(form, image.view(), corners);
       for (const Corner& c : corners) {
         const double expected = reference_harris(image, c.x_px, c.y_px);
@@ -85,8 +85,8 @@ std::vector<Corner> random_corners(std::size_t count, int reach_px, int scores, 
   std::mt19937 random(seed);
   std::vector<Corner> corners(count);
   for (Corner& c : corners)
-    c = {static_cast<std::int16_t>(random() % static_cast<unsigned>(reach_px)),
-         static_cast<std::int16_t>(random() % static_cast<unsigned>(reach_px)),
+    c = {static_cast<int>(random() % static_cast<unsigned>(reach_px)),
+         static_cast<int>(random() % static_cast<unsigned>(reach_px)),
          static_cast<float>(random() % static_cast<unsigned>(scores))};
   return corners;
 }

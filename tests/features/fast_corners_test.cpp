@@ -74,9 +74,7 @@ std::vector<Corner> reference(const Image& image, int border, int threshold) {
           largest =
               largest && (earlier ? at(x, y) > at(x + dx, y + dy) : at(x, y) >= at(x + dx, y + dy));
         }
-      if (largest)
-        corners.push_back({static_cast<std::int16_t>(x), static_cast<std::int16_t>(y),
-                           static_cast<float>(at(x, y))});
+      if (largest) corners.push_back({x, y, static_cast<float>(at(x, y))});
     }
   return corners;
 }

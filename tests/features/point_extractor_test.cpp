@@ -167,6 +167,14 @@ TEST(PointExtractor, TakesHostileImages) {
   }
 }
 
+TEST(PointExtractor, TakesImagesWiderThanSixteenBits) {
+  Image image(40000, 80, 200);
+  image.fill(39900, 40, 40000, 80, 30);
+  const Found found = extract(image.view());
+  ASSERT_FALSE(found.points.empty());
+  for (const Point& p : found.points) EXPECT_NEAR(p.x_px, 39899.5, 3);
+}
+
 TEST(PointExtractor, SeesOnlyThePixelsOfItsView) {
   const Image wide = with_noise(wall_image(4, 0, 400, 200), 5, 1);
   Image part(250, 200);
