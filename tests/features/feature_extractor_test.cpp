@@ -59,7 +59,7 @@ TEST(FeatureExtractor, GivesADescriptorForEachFeatureAndKeepsToItsBounds) {
   EXPECT_EQ(features.points.size(), features.point_descriptors.size());
   EXPECT_EQ(features.lines.size(), features.line_descriptors.size());
   EXPECT_GT(features.points.size(), 100U);
-  EXPECT_LE(features.points.size(), 210U);  // ORB keeps ties of the weakest
+  EXPECT_LE(features.points.size(), 200U);
   EXPECT_EQ(features.lines.size(), 30U);
 }
 
