@@ -20,6 +20,11 @@ class LineExtractor {
   void extract(const LumaView& image, std::vector<Line>& lines,
                std::vector<Descriptor>& descriptors);
 
+  /// The same on an image that is already shrunk (a level of a pyramid) from one of `width_px` x
+  /// `height_px`, in whose pixels the coordinates are; `line_scale` does not count.
+  void extract(const LumaView& shrunk, int width_px, int height_px, std::vector<Line>& lines,
+               std::vector<Descriptor>& descriptors);
+
  private:
   class Impl;
   std::unique_ptr<Impl> impl_;
