@@ -8,8 +8,9 @@
 
 namespace loopd {
 
-/// Finds line segments (LSD, Grompone et al. 2010) and describes them (LBD). Thread: one caller at
-/// a time.
+/// Finds line segments (SegmentDetector) and describes them (LBD), both on one gradient image of
+/// the shrunk image. Images whose shrunk smaller side is below 12 px or whose longer one is above
+/// SegmentDetector::kLargestPx have no lines. Thread: one caller at a time.
 class LineExtractor {
  public:
   explicit LineExtractor(const FeaturesConfig& config);

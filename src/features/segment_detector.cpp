@@ -16,7 +16,7 @@ using Gradient = GradientImage::Gradient;
 // degrees; the wider kernel averages 16 times the pixels' noise.
 constexpr int kMinStrength = 4 * GradientImage::kUnit;
 constexpr float kCosSquaredTolerance = 0.853553391F;  // of 22.5 degrees
-constexpr float kStraightPx = 1.4F;                   // a crest pixel beside its line
+constexpr float kStraightPx = 1.2F;                   // a crest pixel beside its line
 constexpr int kMaxGapPx = 3;                          // along a line, without a crest
 constexpr int kBucketShift = 4;
 constexpr std::size_t kBuckets = (2 * GradientImage::kLargest >> kBucketShift) + 1;
