@@ -4,12 +4,14 @@
 #include <opencv2/imgproc.hpp>
 #include <tuple>
 
+#include "features/gradient_image.h"
 #include "features/lbd.h"
+#include "features/segment_detector.h"
 
 namespace loopd {
 namespace {
 
-constexpr int kSmallestPx = 16;  // of an image's side; LSD has nothing to say about less
+constexpr int kSmallestPx = 12;  // of a shrunk image's side; there is nothing to say about less
 
 float squared_length(const Line& line) {
   const float dx = line.end_x_px - line.start_x_px;
@@ -29,43 +31,60 @@ bool longer(const Line& a, const Line& b) {
 
 class LineExtractor::Impl {
  public:
-  explicit Impl(const FeaturesConfig& config)
-      : config_(config),
-        detector_(cv::createLineSegmentDetector(cv::LSD_REFINE_STD, config.line_scale)) {}
+  explicit Impl(const FeaturesConfig& config) : config_(config) {}
 
   void extract(const LumaView& image, std::vector<Line>& lines,
                std::vector<Descriptor>& descriptors) {
-    lines.clear();
-    descriptors.clear();
-    if (config_.lines == 0 || std::min(image.width_px, image.height_px) < kSmallestPx) return;
-    detect(image, lines);
-    gradient_.compute(image);
-    direct_by_contrast(gradient_, lines);
-    descriptors.resize(lines.size());
-    describe_lines(gradient_, lines, descriptors);
-  }
-
- private:
-  void detect(const LumaView& image, std::vector<Line>& lines) {
+    const cv::Size size(std::max(1, static_cast<int>(image.width_px * config_.line_scale + 0.5)),
+                        std::max(1, static_cast<int>(image.height_px * config_.line_scale + 0.5)));
     const cv::Mat pixels(image.height_px, image.width_px, CV_8UC1,
                          const_cast<std::uint8_t*>(image.data),
                          static_cast<std::size_t>(image.stride_bytes));
-    detector_->detect(pixels, segments_);
-    const auto min_length =
-        static_cast<float>(config_.min_line_length * std::min(image.width_px, image.height_px));
-    for (const cv::Vec4f& s : segments_) {
-      const Line line{s[0], s[1], s[2], s[3]};
-      if (squared_length(line) >= min_length * min_length) lines.push_back(line);
+    cv::resize(pixels, shrunk_, size, 0, 0, cv::INTER_LINEAR);
+    extract({shrunk_.data, size.width, size.height, static_cast<int>(shrunk_.step)}, image.width_px,
+            image.height_px, lines, descriptors);
+  }
+
+  void extract(const LumaView& shrunk, int width_px, int height_px, std::vector<Line>& lines,
+               std::vector<Descriptor>& descriptors) {
+    lines.clear();
+    descriptors.clear();
+    if (config_.lines == 0 || std::min(shrunk.width_px, shrunk.height_px) < kSmallestPx ||
+        std::max(shrunk.width_px, shrunk.height_px) > SegmentDetector::kLargestPx)
+      return;
+    gradient_.compute(shrunk);
+    const double min_length = config_.min_line_length * std::min(shrunk.width_px, shrunk.height_px);
+    detector_.detect(gradient_, static_cast<float>(min_length), lines);
+    keep_longest(lines);
+    descriptors.resize(lines.size());
+    describe_lines(gradient_, lines, descriptors);
+    enlarge(shrunk, width_px, height_px, lines);
+  }
+
+ private:
+  void keep_longest(std::vector<Line>& lines) const {
+    const auto keep = static_cast<std::size_t>(config_.lines);
+    if (lines.size() > keep) {
+      std::nth_element(lines.begin(), lines.begin() + config_.lines, lines.end(), longer);
+      lines.resize(keep);
     }
     std::sort(lines.begin(), lines.end(), longer);
-    const auto keep = static_cast<std::size_t>(config_.lines);
-    if (lines.size() > keep) lines.resize(keep);
+  }
+
+  // Centres of pixels of the shrunk image, in pixels of the full one.
+  static void enlarge(const LumaView& shrunk, int width_px, int height_px,
+                      std::vector<Line>& lines) {
+    const float x = static_cast<float>(width_px) / static_cast<float>(shrunk.width_px);
+    const float y = static_cast<float>(height_px) / static_cast<float>(shrunk.height_px);
+    for (Line& line : lines)
+      line = {(line.start_x_px + 0.5F) * x - 0.5F, (line.start_y_px + 0.5F) * y - 0.5F,
+              (line.end_x_px + 0.5F) * x - 0.5F, (line.end_y_px + 0.5F) * y - 0.5F};
   }
 
   FeaturesConfig config_;
-  cv::Ptr<cv::LineSegmentDetector> detector_;
-  std::vector<cv::Vec4f> segments_;
+  cv::Mat shrunk_;
   GradientImage gradient_;
+  SegmentDetector detector_;
 };
 
 LineExtractor::LineExtractor(const FeaturesConfig& config)
@@ -75,6 +94,11 @@ LineExtractor::~LineExtractor() = default;
 void LineExtractor::extract(const LumaView& image, std::vector<Line>& lines,
                             std::vector<Descriptor>& descriptors) {
   impl_->extract(image, lines, descriptors);
+}
+
+void LineExtractor::extract(const LumaView& shrunk, int width_px, int height_px,
+                            std::vector<Line>& lines, std::vector<Descriptor>& descriptors) {
+  impl_->extract(shrunk, width_px, height_px, lines, descriptors);
 }
 
 }  // namespace loopd

@@ -8,8 +8,9 @@
 
 namespace loopd {
 
-/// Finds line segments (LSD, Grompone et al. 2010) and describes them (LBD). Thread: one caller at
-/// a time.
+/// Finds line segments (SegmentDetector) and describes them (LBD), both on one gradient image of
+/// the shrunk image. Images whose shrunk smaller side is below 12 px or whose longer one is above
+/// SegmentDetector::kLargestPx have no lines. Thread: one caller at a time.
 class LineExtractor {
  public:
   explicit LineExtractor(const FeaturesConfig& config);
@@ -18,6 +19,11 @@ class LineExtractor {
   /// Replaces `lines` and `descriptors` by the longest of `image`, longest first, directed by
   /// contrast. Coordinates are in pixels of `image`. Throws cv::Exception.
   void extract(const LumaView& image, std::vector<Line>& lines,
+               std::vector<Descriptor>& descriptors);
+
+  /// The same on an image that is already shrunk (a level of a pyramid) from one of `width_px` x
+  /// `height_px`, in whose pixels the coordinates are; `line_scale` does not count.
+  void extract(const LumaView& shrunk, int width_px, int height_px, std::vector<Line>& lines,
                std::vector<Descriptor>& descriptors);
 
  private:

@@ -35,11 +35,12 @@ const std::array kParameters = {
     Parameter<Config>{"features.levels", "levels", 1, 12,
                       "Levels of the pyramid; 8 steps of 1.2 cover a factor of 3.6 in distance.",
                       LOOPD_REF(features.levels)},
-    Parameter<Config>{"features.line_scale", "ratio", 0.2, 1.0,
-                      "Lines are found in the image shrunk by this. LSD's usual 0.8; 0.6 takes two "
-                      "thirds of its time and finds 97 % of its lines, with less recall at 100 % "
-                      "precision on a hand-held sequence.",
-                      LOOPD_REF(features.line_scale)},
+    Parameter<Config>{
+        "features.line_scale", "ratio", 0.2, 1.0,
+        "Lines are found and described in the image shrunk by this, which evens out "
+        "noise. LSD's usual 0.8; with 0.833 line inliers of true loops change by -1 to "
+        "3 %, and time by 2 to 4 %.",
+        LOOPD_REF(features.line_scale)},
     Parameter<Config>{"features.min_line_length", "of the image's smaller side", 0.005, 0.5,
                       "Shorter segments are dropped: their descriptors are not stable.",
                       LOOPD_REF(features.min_line_length)},

@@ -90,8 +90,9 @@ TEST(FeatureExtractor, ReportsFullResolutionPixelsOfAReducedImage) {
   config.max_pixels = 320 * 240;
   const Features features = extract(image, config);
   EXPECT_EQ(features.width_px, 640);
-  EXPECT_TRUE(std::any_of(features.lines.begin(), features.lines.end(),
-                          [](const Line& line) { return joins(line, 160, 120, 480, 120); }));
+  EXPECT_TRUE(std::any_of(features.lines.begin(), features.lines.end(), [](const Line& line) {
+    return joins(line, 159.5F, 119.5F, 479.5F, 119.5F);
+  }));
   const auto near_corner = [](const Point& p) {
     return std::hypot(p.x_px - 160, p.y_px - 120) < 8;
   };
