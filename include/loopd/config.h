@@ -19,7 +19,6 @@ struct FeaturesConfig {
   int fast_threshold = 7;
   double scale_factor = 1.2;
   int levels = 8;
-  double line_scale = 0.8;
   double min_line_length = 0.03;
   int min_features = 20;
 };
@@ -39,6 +38,7 @@ struct LoopConfig {
   int island_gap = 5;
   int verified_islands = 3;
   int verified_images = 2;
+  int checked_images = 2;
   double still_fraction = 0.75;
   double still_radius_px = 1.0;
 };

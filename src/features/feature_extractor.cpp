@@ -1,6 +1,6 @@
 #include "features/feature_extractor.h"
 
-#include <opencv2/core.hpp>
+#include <algorithm>
 
 #include "features/reduce.h"
 
@@ -15,20 +15,21 @@ float to_full(float position_px, int factor) {
 }  // namespace
 
 FeatureExtractor::FeatureExtractor(const FeaturesConfig& config)
-    : config_(config), points_(config), lines_(config) {
-  cv::setNumThreads(1);  // the lanes are the parallelism; OpenCV's pool would leave its CPU set
-}
+    : config_(config), points_(config), lines_(config) {}
 
 void FeatureExtractor::prepare(const LumaView& image, Features& features) {
   features.clear();
   features.width_px = image.width_px;
   features.height_px = image.height_px;
   factor_ = reduction_factor(image.width_px, image.height_px, config_.max_pixels);
-  image_ = reduce_image(image, factor_, reduced_);
+  pyramid_.start(reduce_image(image, factor_, reduced_), config_.scale_factor,
+                 std::max(2, config_.levels));
+  pyramid_.build_next();
+  shrunk_ = pyramid_.level(1);
 }
 
 void FeatureExtractor::extract_points(Features& features) {
-  points_.extract(image_, features.points, features.point_descriptors);
+  points_.extract(pyramid_, features.points, features.point_descriptors);
   if (factor_ == 1) return;
   for (Point& p : features.points) {
     p.x_px = to_full(p.x_px, factor_);
@@ -38,7 +39,9 @@ void FeatureExtractor::extract_points(Features& features) {
 }
 
 void FeatureExtractor::extract_lines(Features& features) {
-  lines_.extract(image_, features.lines, features.line_descriptors);
+  const LumaView image = pyramid_.level(0);
+  lines_.extract(shrunk_, image.width_px, image.height_px, features.lines,
+                 features.line_descriptors);
   if (factor_ == 1) return;
   for (Line& line : features.lines)
     for (float* position : {&line.start_x_px, &line.start_y_px, &line.end_x_px, &line.end_y_px})

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "features/image_pyramid.h"
 #include "features/line_extractor.h"
 #include "features/point_extractor.h"
 #include "loopd/config.h"
@@ -17,10 +18,11 @@ class FeatureExtractor {
  public:
   explicit FeatureExtractor(const FeaturesConfig& config);
 
-  /// Takes the image of the coming halves, reduced to at most `features.max_pixels`. The pixels of
-  /// `image` must live until both halves are done.
+  /// Takes the image of the coming halves, reduced to at most `features.max_pixels`, and makes the
+  /// first level of its pyramid, which both read. The pixels of `image` must live until both halves
+  /// are done.
   void prepare(const LumaView& image, Features& features);
-  /// Fill points or lines of `features`, in full-resolution pixels. Throw cv::Exception.
+  /// Fill points or lines of `features`, in full-resolution pixels.
   void extract_points(Features& features);
   void extract_lines(Features& features);
 
@@ -28,7 +30,8 @@ class FeatureExtractor {
   FeaturesConfig config_;
   PointExtractor points_;
   LineExtractor lines_;
-  LumaView image_;
+  ImagePyramid pyramid_;
+  LumaView shrunk_;  // its level 1
   int factor_ = 1;
   std::vector<std::uint8_t> reduced_;
 };

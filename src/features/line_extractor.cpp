@@ -1,7 +1,6 @@
 #include "features/line_extractor.h"
 
 #include <algorithm>
-#include <opencv2/imgproc.hpp>
 #include <tuple>
 
 #include "features/gradient_image.h"
@@ -32,18 +31,6 @@ bool longer(const Line& a, const Line& b) {
 class LineExtractor::Impl {
  public:
   explicit Impl(const FeaturesConfig& config) : config_(config) {}
-
-  void extract(const LumaView& image, std::vector<Line>& lines,
-               std::vector<Descriptor>& descriptors) {
-    const cv::Size size(std::max(1, static_cast<int>(image.width_px * config_.line_scale + 0.5)),
-                        std::max(1, static_cast<int>(image.height_px * config_.line_scale + 0.5)));
-    const cv::Mat pixels(image.height_px, image.width_px, CV_8UC1,
-                         const_cast<std::uint8_t*>(image.data),
-                         static_cast<std::size_t>(image.stride_bytes));
-    cv::resize(pixels, shrunk_, size, 0, 0, cv::INTER_LINEAR);
-    extract({shrunk_.data, size.width, size.height, static_cast<int>(shrunk_.step)}, image.width_px,
-            image.height_px, lines, descriptors);
-  }
 
   void extract(const LumaView& shrunk, int width_px, int height_px, std::vector<Line>& lines,
                std::vector<Descriptor>& descriptors) {
@@ -82,7 +69,6 @@ class LineExtractor::Impl {
   }
 
   FeaturesConfig config_;
-  cv::Mat shrunk_;
   GradientImage gradient_;
   SegmentDetector detector_;
 };
@@ -90,11 +76,6 @@ class LineExtractor::Impl {
 LineExtractor::LineExtractor(const FeaturesConfig& config)
     : impl_(std::make_unique<Impl>(config)) {}
 LineExtractor::~LineExtractor() = default;
-
-void LineExtractor::extract(const LumaView& image, std::vector<Line>& lines,
-                            std::vector<Descriptor>& descriptors) {
-  impl_->extract(image, lines, descriptors);
-}
 
 void LineExtractor::extract(const LumaView& shrunk, int width_px, int height_px,
                             std::vector<Line>& lines, std::vector<Descriptor>& descriptors) {

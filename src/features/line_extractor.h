@@ -16,13 +16,9 @@ class LineExtractor {
   explicit LineExtractor(const FeaturesConfig& config);
   ~LineExtractor();
 
-  /// Replaces `lines` and `descriptors` by the longest of `image`, longest first, directed by
-  /// contrast. Coordinates are in pixels of `image`. Throws cv::Exception.
-  void extract(const LumaView& image, std::vector<Line>& lines,
-               std::vector<Descriptor>& descriptors);
-
-  /// The same on an image that is already shrunk (a level of a pyramid) from one of `width_px` x
-  /// `height_px`, in whose pixels the coordinates are; `line_scale` does not count.
+  /// Replaces `lines` and `descriptors` by the longest of `shrunk`, the first reduction of an image
+  /// of `width_px` x `height_px`, in whose pixels the coordinates are; longest first, directed by
+  /// contrast.
   void extract(const LumaView& shrunk, int width_px, int height_px, std::vector<Line>& lines,
                std::vector<Descriptor>& descriptors);
 

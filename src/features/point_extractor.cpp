@@ -35,17 +35,23 @@ class PointExtractor::Impl {
 
   void extract(const LumaView& image, std::vector<Point>& points,
                std::vector<Descriptor>& descriptors) {
+    pyramid_.start(image, config_.scale_factor, config_.levels);
+    extract(pyramid_, points, descriptors);
+  }
+
+  void extract(ImagePyramid& pyramid, std::vector<Point>& points,
+               std::vector<Descriptor>& descriptors) {
     points.clear();
     descriptors.clear();
+    const LumaView image = pyramid.level(0);
     const int levels = usable_levels(std::min(image.width_px, image.height_px),
                                      config_.scale_factor, config_.levels);
     if (config_.points == 0 || levels == 0) return;
-    pyramid_.start(image, config_.scale_factor, levels);
     share_out(levels);
     double factor = 1;
     for (int i = 0; i < levels; ++i) {
-      if (i > 0) pyramid_.build_next();
-      const LumaView level = pyramid_.level(i);
+      if (i == pyramid.built()) pyramid.build_next();
+      const LumaView level = pyramid.level(i);
       find(level, quota_[static_cast<std::size_t>(i)]);
       describe(level, image, static_cast<float>(kPatchPx * factor), points, descriptors);
       factor *= config_.scale_factor;
@@ -110,6 +116,10 @@ PointExtractor::~PointExtractor() = default;
 void PointExtractor::extract(const LumaView& image, std::vector<Point>& points,
                              std::vector<Descriptor>& descriptors) {
   impl_->extract(image, points, descriptors);
+}
+void PointExtractor::extract(ImagePyramid& pyramid, std::vector<Point>& points,
+                             std::vector<Descriptor>& descriptors) {
+  impl_->extract(pyramid, points, descriptors);
 }
 
 }  // namespace loopd

@@ -3,6 +3,7 @@
 #include <memory>
 #include <vector>
 
+#include "features/image_pyramid.h"
 #include "features/simd.h"
 #include "loopd/config.h"
 #include "loopd/features.h"
@@ -24,6 +25,11 @@ class PointExtractor {
   /// is smaller than the described patch and its borders), by level and then in reading order.
   /// Coordinates are in pixels of `image`.
   void extract(const LumaView& image, std::vector<Point>& points,
+               std::vector<Descriptor>& descriptors);
+
+  /// The same for the image that `pyramid` was started on, with `features.scale_factor`; builds
+  /// the levels that it needs and that are not there.
+  void extract(ImagePyramid& pyramid, std::vector<Point>& points,
                std::vector<Descriptor>& descriptors);
 
  private:

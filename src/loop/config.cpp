@@ -30,17 +30,12 @@ const std::array kParameters = {
                       "97.6 % with 7, 95.1 % with 12 and 20.",
                       LOOPD_REF(features.fast_threshold)},
     Parameter<Config>{"features.scale_factor", "ratio", 1.05, 2.0,
-                      "Step between the levels of ORB's image pyramid.",
+                      "Step between the levels of the image pyramid. Points are found on all of "
+                      "them, lines on the first that is reduced.",
                       LOOPD_REF(features.scale_factor)},
     Parameter<Config>{"features.levels", "levels", 1, 12,
                       "Levels of the pyramid; 8 steps of 1.2 cover a factor of 3.6 in distance.",
                       LOOPD_REF(features.levels)},
-    Parameter<Config>{
-        "features.line_scale", "ratio", 0.2, 1.0,
-        "Lines are found and described in the image shrunk by this, which evens out "
-        "noise. LSD's usual 0.8; with 0.833 line inliers of true loops change by -1 to "
-        "3 %, and time by 2 to 4 %.",
-        LOOPD_REF(features.line_scale)},
     Parameter<Config>{"features.min_line_length", "of the image's smaller side", 0.005, 0.5,
                       "Shorter segments are dropped: their descriptors are not stable.",
                       LOOPD_REF(features.min_line_length)},
@@ -85,6 +80,10 @@ const std::array kParameters = {
         "Of each of them, the best images that are verified; the most convincing is the "
         "match.",
         LOOPD_REF(loop.verified_images)},
+    Parameter<Config>{"loop.checked_images", "images", 1, 256,
+                      "Of all these, how many with the most matches have their geometry checked: "
+                      "the costly step.",
+                      LOOPD_REF(loop.checked_images)},
     Parameter<Config>{"loop.still_fraction", "of the features found again", 0.01, 1,
                       "The camera has not moved if this share of what it sees again is exactly "
                       "where it was. Noise leaves more than 0.8, a slow hand less than 0.6.",

@@ -161,15 +161,10 @@ class Detector::Impl {
   struct Trial {
     Island island;
     Candidate candidate;
+    Features features;
+    ImageMatches matches;
     Verification found;
     InlierPairs pairs;
-  };
-
-  // What a lane needs of its own to verify trials.
-  struct VerifyLane {
-    explicit VerifyLane(const VerifyConfig& config) : verifier(config) {}
-    Verifier verifier;
-    Features candidate;
   };
 
   // The word numbers of one image.
@@ -268,10 +263,11 @@ class Detector::Impl {
     const StageTimer timer(report.times.verify_ns);
     const std::uint64_t seed = seed_of(report.query);
     list_trials();
-    lanes_.run([&] { run_trials(0, seed, point_lane_); }, [&] { run_trials(1, seed, line_lane_); });
-    const Trial& best = *std::max_element(
-        trials_.begin(), trials_.begin() + static_cast<std::ptrdiff_t>(trial_count_),
-        [](const Trial& a, const Trial& b) { return conviction(a.found) < conviction(b.found); });
+    lanes_.run([&] { match_trials(0, point_lane_); }, [&] { match_trials(1, line_lane_); });
+    choose_trials();
+    lanes_.run([&] { check_trials(0, seed, point_lane_); },
+               [&] { check_trials(1, seed, line_lane_); });
+    const Trial& best = *most_convincing();
     const MapImage& image = *map_.find(best.candidate.image);
     report.island = best.island;
     report.match = Match{image.id, image.sequence, image.time_ns, best.candidate.score};
@@ -296,12 +292,39 @@ class Detector::Impl {
   }
 
   // Every second trial, so that two lanes share the work; each is independent of all others.
-  void run_trials(std::size_t first, std::uint64_t seed, VerifyLane& lane) {
+  void match_trials(std::size_t first, Verifier& verifier) {
     for (std::size_t i = first; i < trial_count_; i += 2) {
       Trial& trial = trials_[i];
-      map_.load(*map_.find(trial.candidate.image), lane.candidate);
-      trial.found = lane.verifier.verify(features_, lane.candidate, seed, trial.pairs);
+      map_.load(*map_.find(trial.candidate.image), trial.features);
+      verifier.match(features_, trial.features, trial.matches);
     }
+  }
+
+  // Those with the most matches, in the order of the trials among equals.
+  void choose_trials() {
+    checked_.clear();
+    for (std::size_t i = 0; i < trial_count_; ++i) checked_.push_back(i);
+    std::sort(checked_.begin(), checked_.end(), [this](std::size_t a, std::size_t b) {
+      const std::size_t in_a = trials_[a].matches.size(), in_b = trials_[b].matches.size();
+      return in_a != in_b ? in_a > in_b : a < b;
+    });
+    const auto most = static_cast<std::size_t>(config_.loop.checked_images);
+    if (checked_.size() > most) checked_.resize(most);
+  }
+
+  void check_trials(std::size_t first, std::uint64_t seed, Verifier& verifier) {
+    for (std::size_t i = first; i < checked_.size(); i += 2) {
+      Trial& trial = trials_[checked_[i]];
+      trial.found = verifier.check(features_, trial.features, trial.matches, seed, trial.pairs);
+    }
+  }
+
+  const Trial* most_convincing() const {
+    const Trial* best = nullptr;
+    for (const std::size_t i : checked_)
+      if (best == nullptr || conviction(trials_[i].found) > conviction(best->found))
+        best = &trials_[i];
+    return best;
   }
 
   Outcome judge(const Verification& found) const {
@@ -426,8 +449,8 @@ class Detector::Impl {
   const MapLayout capacity_;
   Vocabulary point_words_;
   Vocabulary line_words_;
-  VerifyLane point_lane_;
-  VerifyLane line_lane_;
+  Verifier point_lane_;
+  Verifier line_lane_;
   StillnessTest stillness_;
   ImageMap map_;
 
@@ -454,6 +477,7 @@ class Detector::Impl {
   std::vector<Trial>
       trials_;  // grows to its largest and stays; the first trial_count_ are this frame's
   std::size_t trial_count_ = 0;
+  std::vector<std::size_t> checked_;  // trials whose geometry is checked
 };
 
 Detector::Detector(const Config& config, LaneExecutor* lanes)

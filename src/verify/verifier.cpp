@@ -87,11 +87,19 @@ class Verifier::Impl {
  public:
   explicit Impl(const VerifyConfig& config) : config_(config) {}
 
-  Verification verify(const Features& query, const Features& candidate, std::uint64_t seed,
-                      InlierPairs& pairs) {
+  void match(const Features& query, const Features& candidate, ImageMatches& out) {
+    point_matcher_.match(query.point_descriptors, candidate.point_descriptors, config_, out.points);
+    out.rotation_rad = rotation_from_points(query.points, candidate.points, out.points);
+    if (config_.line_angle_filter)
+      line_matcher_.match(query, candidate, config_, out.rotation_rad, out.lines);
+    else
+      line_matcher_.match_nndr(query, candidate, config_, out.rotation_rad, out.lines);
+  }
+
+  Verification check(const Features& query, const Features& candidate, const ImageMatches& matches,
+                     std::uint64_t seed, InlierPairs& pairs) {
     pairs.clear();
-    const auto rotation = match(query, candidate);
-    make_correspondences(query, candidate, point_matches_, line_matches_, rotation,
+    make_correspondences(query, candidate, matches.points, matches.lines, matches.rotation_rad,
                          config_.epipolar_px, c_);
 
     Random random(seed);
@@ -99,30 +107,18 @@ class Verifier::Impl {
     const auto epipolar = find_fundamental(plane ? &*plane : nullptr, random);
 
     Verification out;
-    out.point_matches = static_cast<int>(point_matches_.size());
-    out.line_matches = static_cast<int>(line_matches_.size());
+    out.point_matches = static_cast<int>(matches.points.size());
+    out.line_matches = static_cast<int>(matches.lines.size());
     if (plane) out.homography = homography_in_pixels(plane->forward, c_);
     if (epipolar) out.fundamental = fundamental_in_pixels(epipolar->fundamental, c_);
     choose(plane, epipolar, query, candidate, out);
-    list_inliers(query, candidate, pairs);
+    list_inliers(query, candidate, matches, pairs);
     out.point_inliers = count_distinct_points(pairs, query, candidate);
     measure_spread(pairs, query, out);
     return out;
   }
 
  private:
-  // Fills the matches; the global rotation, as the points see it, where they do.
-  std::optional<double> match(const Features& query, const Features& candidate) {
-    point_matcher_.match(query.point_descriptors, candidate.point_descriptors, config_,
-                         point_matches_);
-    const auto rotation = rotation_from_points(query.points, candidate.points, point_matches_);
-    if (config_.line_angle_filter)
-      line_matcher_.match(query, candidate, config_, rotation, line_matches_);
-    else
-      line_matcher_.match_nndr(query, candidate, config_, rotation, line_matches_);
-    return rotation;
-  }
-
   // Leaves the residuals of the found model in homography_residuals_.
   std::optional<HomographyModel> find_homography(Random& random) {
     homography_residuals_.assign(c_.size(), 2.0);
@@ -165,16 +161,17 @@ class Verifier::Impl {
   }
 
   // Raw pixel positions of the entries that the chosen model explains, points first.
-  void list_inliers(const Features& query, const Features& candidate, InlierPairs& pairs) const {
+  void list_inliers(const Features& query, const Features& candidate, const ImageMatches& matches,
+                    InlierPairs& pairs) const {
     if (chosen_residuals_.empty()) return;
     for (std::size_t i = 0; i < c_.points; ++i) {
       if (chosen_residuals_[i] > 1) continue;
-      const FeatureMatch& m = point_matches_[c_.point_match[i]];
+      const FeatureMatch& m = matches.points[c_.point_match[i]];
       const Point &q = query.points[m.query], &p = candidate.points[m.candidate];
       pairs.push_back({q.x_px, q.y_px, p.x_px, p.y_px, false});
     }
     for (std::size_t i = 0; i < c_.lines; ++i) {
-      const LineMatch& m = line_matches_[c_.line_match[i]];
+      const LineMatch& m = matches.lines[c_.line_match[i]];
       const Line &q = query.lines[m.query], &p = candidate.lines[m.candidate];
       const std::array<float, 2> start{p.start_x_px, p.start_y_px}, end{p.end_x_px, p.end_y_px};
       const auto &first = m.flipped ? end : start, &second = m.flipped ? start : end;
@@ -188,8 +185,6 @@ class Verifier::Impl {
   VerifyConfig config_;
   PointMatcher point_matcher_;
   LineMatcher line_matcher_;
-  std::vector<FeatureMatch> point_matches_;
-  std::vector<LineMatch> line_matches_;
   Correspondences c_;
   RansacScratch scratch_;
   std::vector<double> homography_residuals_;
@@ -200,13 +195,24 @@ class Verifier::Impl {
 Verifier::Verifier(const VerifyConfig& config) : impl_(std::make_unique<Impl>(config)) {}
 Verifier::~Verifier() = default;
 
-Verification Verifier::verify(const Features& query, const Features& candidate, std::uint64_t seed,
-                              InlierPairs& pairs) {
+void Verifier::match(const Features& query, const Features& candidate, ImageMatches& matches) {
   assert(query.points.size() == query.point_descriptors.size());
   assert(query.lines.size() == query.line_descriptors.size());
   assert(candidate.points.size() == candidate.point_descriptors.size());
   assert(candidate.lines.size() == candidate.line_descriptors.size());
-  return impl_->verify(query, candidate, seed, pairs);
+  impl_->match(query, candidate, matches);
+}
+
+Verification Verifier::check(const Features& query, const Features& candidate,
+                             const ImageMatches& matches, std::uint64_t seed, InlierPairs& pairs) {
+  return impl_->check(query, candidate, matches, seed, pairs);
+}
+
+Verification Verifier::verify(const Features& query, const Features& candidate, std::uint64_t seed,
+                              InlierPairs& pairs) {
+  ImageMatches matches;
+  match(query, candidate, matches);
+  return check(query, candidate, matches, seed, pairs);
 }
 
 }  // namespace loopd

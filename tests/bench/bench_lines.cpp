@@ -21,6 +21,7 @@
 #include "base/hamming.h"
 #include "capture/decode.h"
 #include "capture/folder_source.h"
+#include "features/image_pyramid.h"
 #include "features/line_extractor.h"
 #include "support/scene_image.h"
 
@@ -73,11 +74,14 @@ class Ours {
  public:
   Found detect(const cv::Mat& image) {
     Found found;
-    extractor_.extract(view_of(image), found.lines, found.descriptors);
+    pyramid_.start(view_of(image), FeaturesConfig{}.scale_factor, 2);
+    pyramid_.build_next();
+    extractor_.extract(pyramid_.level(1), image.cols, image.rows, found.lines, found.descriptors);
     return found;
   }
 
  private:
+  ImagePyramid pyramid_;
   LineExtractor extractor_{FeaturesConfig{}};
 };
 

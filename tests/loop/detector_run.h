@@ -21,7 +21,6 @@ inline Config small_config() {
   config.features.fast_threshold = 12;
   config.features.scale_factor = 1.2;
   config.features.levels = 4;
-  config.features.line_scale = 0.8;
   config.features.min_line_length = 0.03;
   config.features.min_features = 20;
   config.index.word_ratio = 0.8;
