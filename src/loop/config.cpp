@@ -80,10 +80,11 @@ const std::array kParameters = {
         "Of each of them, the best images that are verified; the most convincing is the "
         "match.",
         LOOPD_REF(loop.verified_images)},
-    Parameter<Config>{"loop.checked_images", "images", 1, 256,
-                      "Of all these, how many with the most matches have their geometry checked: "
-                      "the costly step.",
-                      LOOPD_REF(loop.checked_images)},
+    Parameter<Config>{
+        "loop.checked_images", "images", 1, 256,
+        "Of all these, how many are checked for one geometry: those with the most matches "
+        "that turn together, over the widest part of the view.",
+        LOOPD_REF(loop.checked_images)},
     Parameter<Config>{"loop.still_fraction", "of the features found again", 0.01, 1,
                       "The camera has not moved if this share of what it sees again is exactly "
                       "where it was. Noise leaves more than 0.8, a slow hand less than 0.6.",

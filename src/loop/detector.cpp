@@ -300,13 +300,13 @@ class Detector::Impl {
     }
   }
 
-  // Those with the most matches, in the order of the trials among equals.
+  // The most promising, in the order of the trials among equals.
   void choose_trials() {
     checked_.clear();
     for (std::size_t i = 0; i < trial_count_; ++i) checked_.push_back(i);
     std::sort(checked_.begin(), checked_.end(), [this](std::size_t a, std::size_t b) {
-      const std::size_t in_a = trials_[a].matches.size(), in_b = trials_[b].matches.size();
-      return in_a != in_b ? in_a > in_b : a < b;
+      const double of_a = trials_[a].matches.promise, of_b = trials_[b].matches.promise;
+      return of_a != of_b ? of_a > of_b : a < b;
     });
     const auto most = static_cast<std::size_t>(config_.loop.checked_images);
     if (checked_.size() > most) checked_.resize(most);

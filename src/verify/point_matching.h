@@ -6,6 +6,7 @@
 
 #include "loopd/config.h"
 #include "loopd/features.h"
+#include "verify/distance_rows.h"
 #include "verify/matches.h"
 
 namespace loopd {
@@ -24,8 +25,7 @@ class PointMatcher {
              const VerifyConfig& config, std::vector<FeatureMatch>& matches);
 
  private:
-  std::vector<std::uint16_t> row_;
-  std::vector<std::uint16_t> nearest_query_distance_;  // by candidate point
+  DistanceRows rows_;
   std::vector<bool> used_;
 };
 

@@ -81,6 +81,38 @@ int count_distinct_points(const InlierPairs& pairs, const Features& query,
   return distinct;
 }
 
+// Points of one scene turn together from one image to the other.
+constexpr double kMostTurnApart = 30 * (kPi / 180);
+
+bool turns_with(const Point& query, const Point& candidate, double rotation_rad) {
+  const auto known = [](float angle_deg) { return angle_deg >= 0 && angle_deg <= 360; };
+  if (!known(query.angle_deg) || !known(candidate.angle_deg)) return false;
+  const double turn = (candidate.angle_deg - query.angle_deg) * (kPi / 180);
+  return absolute_angle(turn - rotation_rad) <= kMostTurnApart;
+}
+
+double promise_of(const Features& query, const Features& candidate, const ImageMatches& matches) {
+  if (query.width_px < 1 || query.height_px < 1) return 0;
+  std::bitset<kCellColumns * kCellRows> held;
+  const auto hold = [&](double x, double y) {
+    if (!std::isfinite(x) || !std::isfinite(y)) return;
+    held.set(static_cast<std::size_t>(cell_of(y, query.height_px, kCellRows) * kCellColumns +
+                                      cell_of(x, query.width_px, kCellColumns)));
+  };
+  std::size_t agreeing = matches.lines.size();
+  for (const LineMatch& m : matches.lines)
+    hold(query.lines[m.query].start_x_px, query.lines[m.query].start_y_px);
+  for (const FeatureMatch& m : matches.points) {
+    const Point& q = query.points[m.query];
+    if (matches.rotation_rad &&
+        !turns_with(q, candidate.points[m.candidate], *matches.rotation_rad))
+      continue;
+    hold(q.x_px, q.y_px);
+    ++agreeing;
+  }
+  return static_cast<double>(agreeing) * std::sqrt(static_cast<double>(held.count()));
+}
+
 }  // namespace
 
 class Verifier::Impl {
@@ -94,6 +126,7 @@ class Verifier::Impl {
       line_matcher_.match(query, candidate, config_, out.rotation_rad, out.lines);
     else
       line_matcher_.match_nndr(query, candidate, config_, out.rotation_rad, out.lines);
+    out.promise = promise_of(query, candidate, out);
   }
 
   Verification check(const Features& query, const Features& candidate, const ImageMatches& matches,

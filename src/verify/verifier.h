@@ -20,6 +20,9 @@ struct ImageMatches {
   std::vector<FeatureMatch> points;
   std::vector<LineMatch> lines;
   std::optional<double> rotation_rad;  ///< of the candidate against the query, where points tell
+  /// How likely geometry will agree: matches that turn by the global rotation, times the root of
+  /// the number of cells of the query that hold some. Only its order means something.
+  double promise = 0;
   std::size_t size() const { return points.size() + lines.size(); }
 };
 
