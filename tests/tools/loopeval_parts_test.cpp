@@ -16,7 +16,7 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-constexpr std::ptrdiff_t kCommas = 26;
+constexpr std::ptrdiff_t kCommas = 27;
 
 std::unique_ptr<Report> loop_report(ImageId query, int spread_inliers) {
   auto report = std::make_unique<Report>();

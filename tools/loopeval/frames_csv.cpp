@@ -116,6 +116,10 @@ std::string report_row(const Report& report, std::string_view file,
   add_evidence(row, report.verification);
   row.text(report.still ? "1" : "0").number(report.points).number(report.lines);
   row.number(report.images);
+  if (report.verification)
+    row.number(report.verification->agreeing);
+  else
+    row.empty(1);
   return row.take();
 }
 

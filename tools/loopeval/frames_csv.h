@@ -16,7 +16,7 @@ namespace loopd::loopeval {
 inline constexpr std::string_view kFramesHeader =
     "query,file,outcome,match,island_first,island_last,similarity,point_inliers,line_inliers,"
     "inliers,features_ms,search_ms,verify_ms,update_ms,total_ms,words_points,words_lines,bytes,"
-    "point_matches,line_matches,cells,spread_inliers,model,still,points,lines,images";
+    "point_matches,line_matches,cells,spread_inliers,model,still,points,lines,images,agreeing";
 
 /// The row of a processed frame, without its line feed. Images are named by their index in the
 /// recording: `sequence_of` gives it for each ImageId up to report.query. What is not known stays

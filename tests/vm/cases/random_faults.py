@@ -13,7 +13,9 @@ from vm.events import Events
 
 FAULTS = ("inject_v4l2_buf_flag_error", "inject_fatal_streaming_error", "inject_vidioc_reqbufs_error",
           "inject_vidioc_streamon_error", "inject_vidioc_qbuf_error", "disconnect")
-SETTLING = 0.2  # of the time: each way to fail has been met, the allocator has what these need
+# By then each way to fail has been met, several times, and the memory is there that these need.
+SETTLING = 0.2  # of the time
+SETTLING_FAULTS = 100
 
 
 def strike(choice, camera):
@@ -48,7 +50,7 @@ def run():
             if time.monotonic() >= minute + 60:
                 minute += 60
                 note(f"{count} faults: {loopd.Footprint(loopd.main_pid())}")
-            if before is None and time.monotonic() >= begun + minutes * 60 * SETTLING and count >= 10:
+            if before is None and time.monotonic() >= begun + minutes * 60 * SETTLING and count >= SETTLING_FAULTS:
                 before = loopd.Footprint(loopd.main_pid())
                 map_before = events.next("stats", 10)["bytes"]
         note(f"{count} faults")
