@@ -26,14 +26,15 @@ std::uint32_t InvertedFile::take_chunk() noexcept {
   return taken;
 }
 
-void InvertedFile::add(std::uint32_t word, std::uint32_t image) noexcept {
+bool InvertedFile::add(std::uint32_t word, std::uint32_t image) noexcept {
   assert(image < Posting::kMaxImages);
   Word& record = words_[word];
   if (record.images > 0 && last(record).image == image) {
     if (last(record).count < Posting::kMaxCount) ++last(record).count;
-    return;
+    return true;
   }
   if (record.images >= kInline && chained(record) % kInChunk == 0) {
+    if (free_chunks() == 0) return false;
     const std::uint32_t chunk = take_chunk();
     chunks_[chunk].next = record.head;
     record.head = chunk;
@@ -42,6 +43,7 @@ void InvertedFile::add(std::uint32_t word, std::uint32_t image) noexcept {
   Posting& added = last(record);
   added.image = image & (Posting::kMaxImages - 1);
   added.count = 1;
+  return true;
 }
 
 Posting* InvertedFile::find(Word& record, std::uint32_t image) {

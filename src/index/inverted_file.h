@@ -32,12 +32,13 @@ class InvertedFile {
   static std::size_t bytes_for(std::size_t words, std::size_t chunks);
   std::size_t bytes() const { return words_.bytes() + chunks_.bytes(); }
 
-  /// add() takes at most one.
+  /// add() takes at most one, and seldom any.
   std::size_t free_chunks() const { return chunks_.size() - used_chunks_; }
 
   /// Image `image` shows `word` once (more). An image's calls for a word must not be interrupted by
-  /// another image's. Precondition: free_chunks() > 0, image < Posting::kMaxImages.
-  void add(std::uint32_t word, std::uint32_t image) noexcept;
+  /// another image's. False, and nothing has changed, if that needs a chunk and none is free.
+  /// Precondition: image < Posting::kMaxImages.
+  bool add(std::uint32_t word, std::uint32_t image) noexcept;
 
   /// Image `image` shows `word` no longer; nothing happens if it did not. Returns how many images
   /// are left. Cost: one pass over the word's postings.

@@ -62,7 +62,7 @@ class Vocabulary::Impl {
   }
 
   std::size_t add(ImageId image, std::span<const Descriptor> descriptors, std::span<WordId> words) {
-    assert(has_room(descriptors.size()) && descriptors.size() == words.size());
+    assert(images() < capacity_.images && descriptors.size() == words.size());
     assert(!newest_ || slots_[*newest_].image < image || !slots_[*newest_].used);
     plan(descriptors);
     make_words();
@@ -73,8 +73,11 @@ class Vocabulary::Impl {
       if (words[i] == kNoWord) continue;
       shared += newest_ && inverted_.last_is(words[i], *newest_) ? 1 : 0;
     }
-    for (const WordId word : words)
-      if (word != kNoWord) inverted_.add(word, slot);
+    for (WordId& word : words) {
+      if (word == kNoWord || inverted_.add(word, slot)) continue;
+      word = kNoWord;
+      ++words_refused_;
+    }
     newest_ = slot;
     return shared;
   }

@@ -46,13 +46,13 @@ class Vocabulary {
   /// Precondition: at most `capacity.descriptors` of them.
   void search(std::span<const Descriptor> query, std::vector<Candidate>& candidates);
 
-  /// Whether add() can take an image of so many descriptors.
+  /// Whether add() can take an image of so many descriptors with nothing left out.
   bool has_room(std::size_t descriptors) const;
 
   /// Makes `image` searchable: each descriptor joins the word it matches or becomes a new word, as
-  /// far as there is room for new ones; words[i] is that of descriptor i, or kNoWord. Returns how
-  /// many descriptors share their word with the image added before.
-  /// Precondition: has_room(), ids grow from call to call, sizes are equal.
+  /// far as there is room; words[i] is that of descriptor i, or kNoWord. Returns how many
+  /// descriptors share their word with the image added before.
+  /// Precondition: images() < capacity.images, ids grow from call to call, sizes are equal.
   std::size_t add(ImageId image, std::span<const Descriptor> descriptors, std::span<WordId> words);
 
   /// Deletes those of an image's words that no other image shows. They become kNoWord.
@@ -67,7 +67,7 @@ class Vocabulary {
 
   std::size_t words() const;
   std::size_t images() const;
-  /// New words for which there was no room, since it was made.
+  /// Descriptors whose word found no room, since it was made.
   std::uint64_t words_refused() const;
   std::size_t posting_chunks() const;  ///< in use
   std::size_t bytes_in_use() const;

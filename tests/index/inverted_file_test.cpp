@@ -59,6 +59,18 @@ TEST(InvertedFile, HoldsTheLargestImageNumberAndTheLargestCount) {
   EXPECT_EQ(postings(file, 0), (Counts{{Posting::kMaxImages - 1, Posting::kMaxCount}}));
 }
 
+TEST(InvertedFile, RefusesWhatNeedsAChunkWhenNoneIsFree) {
+  InvertedFile file(2, 1);
+  for (std::uint32_t image = 0; image < 21; ++image) ASSERT_TRUE(file.add(0, image)) << image;
+  EXPECT_FALSE(file.add(0, 21));
+  EXPECT_EQ(file.images(0), 21u);
+  EXPECT_TRUE(file.add(0, 20)) << "its posting is there";
+  for (std::uint32_t image = 0; image < 6; ++image) ASSERT_TRUE(file.add(1, image));
+  EXPECT_FALSE(file.add(1, 6));
+  for (std::uint32_t image = 0; image < 15; ++image) file.remove(0, image);
+  EXPECT_TRUE(file.add(1, 6));
+}
+
 TEST(InvertedFile, IsAMapOfCountsUnderAnyMixOfAddAndRemove) {
   constexpr std::uint32_t kWords = 40;
   DescriptorSamples samples(6);

@@ -446,6 +446,19 @@ TEST(Vocabulary, WithoutRoomForNewWordsAnImageKeepsThoseItMatches) {
   vocabulary.expect_consistent();
 }
 
+TEST(Vocabulary, WithoutRoomForPostingsAnImageKeepsTheOthers) {
+  const auto w = far_words(3);
+  const VocabularyCapacity small{.images = 30, .words = 8, .posting_chunks = 0, .descriptors = 8};
+  Kept vocabulary{IndexConfig{}, small};
+  for (ImageId image = 0; image < 10; ++image) vocabulary.add(image, {w[0], w[1 + image % 2]});
+  EXPECT_EQ(search(vocabulary, {w[0]}).size(), 6u);
+  EXPECT_EQ(search(vocabulary, {w[1]}).size(), 5u);
+  EXPECT_EQ(vocabulary.vocabulary().words_refused(), 4u);
+  vocabulary.expect_consistent();
+  for (int i = 0; i < 5; ++i) vocabulary.remove(0);
+  vocabulary.expect_consistent();
+}
+
 TEST(Vocabulary, SaysWhetherThereIsRoomForAnImage) {
   const VocabularyCapacity small{.images = 2, .words = 8, .posting_chunks = 5, .descriptors = 8};
   Kept vocabulary{IndexConfig{}, small};
