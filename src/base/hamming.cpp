@@ -4,7 +4,8 @@
 #include <cassert>
 
 #if defined(__x86_64__)
-// g++ 12 takes the deliberately undefined operands inside these intrinsics for mistakes (bug 105593).
+// g++ 12 takes the deliberately undefined operands inside these intrinsics for mistakes (bug
+// 105593).
 #pragma GCC diagnostic ignored "-Wuninitialized"
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 #include <immintrin.h>
@@ -61,6 +62,27 @@ LOOPD_POPCNT inline std::uint16_t distance_popcnt(const Descriptor& a, const Des
 }
 LOOPD_HAMMING_FORM(popcnt, LOOPD_POPCNT, distance_popcnt)
 
+// Bit counts of nibbles by a table of 16 (Mula, Kurz, Lemire 2018), of all 256 bits at once.
+#define LOOPD_AVX2 __attribute__((target("avx2")))
+LOOPD_AVX2 inline __m256i byte_counts(__m256i v) {
+  const __m256i of_nibble =
+      _mm256_broadcastsi128_si256(_mm_setr_epi8(0, 1, 1, 2, 1, 2, 2, 3, 1, 2, 2, 3, 2, 3, 3, 4));
+  const __m256i low = _mm256_set1_epi8(0x0f);
+  return _mm256_add_epi8(
+      _mm256_shuffle_epi8(of_nibble, _mm256_and_si256(v, low)),
+      _mm256_shuffle_epi8(of_nibble, _mm256_and_si256(_mm256_srli_epi16(v, 4), low)));
+}
+
+LOOPD_AVX2 inline std::uint16_t distance_avx2(const Descriptor& a, const Descriptor& b) {
+  const __m256i x = _mm256_load_si256(reinterpret_cast<const __m256i*>(a.words.data()));
+  const __m256i y = _mm256_load_si256(reinterpret_cast<const __m256i*>(b.words.data()));
+  const __m256i sums = _mm256_sad_epu8(byte_counts(_mm256_xor_si256(x, y)), _mm256_setzero_si256());
+  const __m128i half =
+      _mm_add_epi64(_mm256_castsi256_si128(sums), _mm256_extracti128_si256(sums, 1));
+  return static_cast<std::uint16_t>(_mm_cvtsi128_si32(half) + _mm_extract_epi16(half, 4));
+}
+LOOPD_HAMMING_FORM(avx2, LOOPD_AVX2, distance_avx2)
+
 #define LOOPD_AVX512 __attribute__((target("avx512vpopcntdq,avx512f,avx512vl,avx2")))
 LOOPD_AVX512 inline std::uint16_t distance_avx512(const Descriptor& a, const Descriptor& b) {
   const __m256i x = _mm256_load_si256(reinterpret_cast<const __m256i*>(a.words.data()));
@@ -116,7 +138,7 @@ LOOPD_HAMMING_FORM(neon, , distance_neon)
 #endif
 
 struct Forms {
-  std::array<HammingForm, 3> list{};
+  std::array<HammingForm, 4> list{};
   std::size_t count = 0;
 
   Forms() {
@@ -124,6 +146,7 @@ struct Forms {
 #if defined(__x86_64__)
     __builtin_cpu_init();
     if (__builtin_cpu_supports("popcnt")) list[count++] = HammingForm::kPopcnt;
+    if (__builtin_cpu_supports("avx2")) list[count++] = HammingForm::kAvx2;
     if (__builtin_cpu_supports("avx512vpopcntdq") && __builtin_cpu_supports("avx512f") &&
         __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx2"))
       list[count++] = HammingForm::kAvx512;
@@ -143,6 +166,8 @@ Batch batch_of(HammingForm form) {
 #if defined(__x86_64__)
     case HammingForm::kPopcnt:
       return batch_popcnt;
+    case HammingForm::kAvx2:
+      return batch_avx2;
     case HammingForm::kAvx512:
       return batch_avx512;
 #elif defined(__aarch64__)
@@ -159,6 +184,8 @@ Gather gather_of(HammingForm form) {
 #if defined(__x86_64__)
     case HammingForm::kPopcnt:
       return gather_popcnt;
+    case HammingForm::kAvx2:
+      return gather_avx2;
     case HammingForm::kAvx512:
       return gather_avx512_single;
 #elif defined(__aarch64__)
@@ -184,6 +211,8 @@ std::string_view hamming_form_name(HammingForm form) {
       return "portable";
     case HammingForm::kPopcnt:
       return "popcnt";
+    case HammingForm::kAvx2:
+      return "avx2";
     case HammingForm::kAvx512:
       return "avx512";
     case HammingForm::kNeon:

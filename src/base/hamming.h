@@ -14,7 +14,7 @@ int hamming_distance(const Descriptor& a, const Descriptor& b);
 
 /// The implementations of the batch functions below that this CPU can run, portable first. All give
 /// the same results; the last is the fastest and is the one used.
-enum class HammingForm : std::uint8_t { kPortable, kPopcnt, kAvx512, kNeon };
+enum class HammingForm : std::uint8_t { kPortable, kPopcnt, kAvx2, kAvx512, kNeon };
 std::span<const HammingForm> hamming_forms();
 std::string_view hamming_form_name(HammingForm form);
 

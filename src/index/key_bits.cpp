@@ -1,20 +1,20 @@
 #include "index/key_bits.h"
 
-#include <bit>
+#include <algorithm>
 #include <cassert>
-#include <cstring>
-#include <vector>
+
+#include "base/hamming.h"
 
 namespace loopd {
 namespace {
 
-constexpr std::size_t kBits = 256;
+constexpr std::size_t kBits = KeyBits::Workspace::kBits;
 // Weights of the choice: a bit always set costs kImbalance, one already used by another table
 // kUse, one fully correlated with a bit of the same table 1.
-constexpr double kImbalance = 1.0;
-constexpr double kUse = 0.15;
+constexpr float kImbalance = 1.0F;
+constexpr float kUse = 0.15F;
 // Random part, so that tables that are otherwise equal differ; below every real difference.
-constexpr double kJitter = 0.01;
+constexpr float kJitter = 0.01F;
 
 // kSpread[b]: the eight bits of b as eight bytes of 0 or 1, low bit in the low byte.
 constexpr std::array<std::uint64_t, 256> kSpread = [] {
@@ -24,84 +24,92 @@ constexpr std::array<std::uint64_t, 256> kSpread = [] {
   return spread;
 }();
 
-// SplitMix64 (Steele, Lea, Flood 2014): the next of a seeded sequence, as a double in [0, 1).
-double next_random(std::uint64_t& state) {
+// SplitMix64 (Steele, Lea, Flood 2014): the next of a seeded sequence, as a float in [0, 1).
+float next_random(std::uint64_t& state) {
   state += 0x9e3779b97f4a7c15u;
   std::uint64_t z = state;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  return static_cast<double>((z ^ (z >> 31)) >> 11) * 0x1p-53;
+  return static_cast<float>((z ^ (z >> 31)) >> 40) * 0x1p-24F;
 }
 
-// How often each bit is set in a sample, and the squared correlation of each pair.
+// How often each bit is set in a sample, and the squared correlation of each pair, in a workspace.
 class BitStatistics {
  public:
-  explicit BitStatistics(std::span<const Descriptor> sample)
-      : blocks_((sample.size() + 63) / 64), columns_(kBits * blocks_), squared_(kBits * kBits) {
+  BitStatistics(std::span<const Descriptor> sample, KeyBits::Workspace& workspace)
+      : workspace_(workspace), n_(static_cast<float>(sample.size())) {
     transpose(sample);
-    const auto n = static_cast<double>(sample.size());
-    for (std::size_t i = 0; i < kBits; ++i) mean_[i] = static_cast<double>(both(i, i)) / n;
-    for (std::size_t i = 0; i < kBits; ++i)
-      for (std::size_t j = 0; j <= i; ++j)
-        squared_[i * kBits + j] = squared_[j * kBits + i] = correlation(i, j, n);
+    for (std::size_t i = 0; i < kBits; ++i) {
+      std::uint32_t set = 0;
+      for (const auto& block : workspace_.columns)
+        set += static_cast<std::uint32_t>(hamming_distance(block[i], Descriptor{}));
+      set_[i] = static_cast<float>(set);
+    }
+    for (std::size_t i = 0; i < kBits; ++i) correlate(i);
   }
 
-  double mean(std::size_t bit) const { return mean_[bit]; }
-  double squared_correlation(std::size_t i, std::size_t j) const { return squared_[i * kBits + j]; }
+  float mean(std::size_t bit) const { return set_[bit] / n_; }
 
  private:
   void transpose(std::span<const Descriptor> sample) {
+    for (auto& block : workspace_.columns) block.fill(Descriptor{});
     for (std::size_t s = 0; s < sample.size(); ++s)
       for (std::size_t bit = 0; bit < kBits; ++bit)
-        columns_[bit * blocks_ + s / 64] |= ((sample[s].words[bit / 64] >> (bit % 64)) & 1)
-                                            << (s % 64);
+        workspace_.columns[s / kBits][bit].words[s % kBits / 64] |=
+            ((sample[s].words[bit / 64] >> (bit % 64)) & 1) << (s % 64);
   }
 
-  // In how many of the sample bits i and j are both set.
-  std::uint64_t both(std::size_t i, std::size_t j) const {
-    std::uint64_t count = 0;
-    for (std::size_t k = 0; k < blocks_; ++k)
-      count += static_cast<std::uint64_t>(
-          std::popcount(columns_[i * blocks_ + k] & columns_[j * blocks_ + k]));
-    return count;
+  // Bit i with all bits up to i. Where two columns differ tells where both are set:
+  // |a and b| = (|a| + |b| - |a xor b|) / 2.
+  void correlate(std::size_t i) {
+    std::array<std::uint32_t, kBits> differ{};
+    std::array<std::uint16_t, kBits> in_block;
+    for (const auto& block : workspace_.columns) {
+      hamming_distances(block[i], std::span(block).first(i + 1), std::span(in_block).first(i + 1));
+      for (std::size_t j = 0; j <= i; ++j) differ[j] += in_block[j];
+    }
+    auto& squared = workspace_.squared_correlation;
+    for (std::size_t j = 0; j <= i; ++j)
+      squared[i][j] = squared[j][i] =
+          correlation(i, j, (set_[i] + set_[j] - static_cast<float>(differ[j])) / 2);
   }
 
   // A bit that never changes counts as fully correlated with all: it is the last to be chosen.
-  double correlation(std::size_t i, std::size_t j, double n) const {
-    const double variances = mean_[i] * (1 - mean_[i]) * mean_[j] * (1 - mean_[j]);
+  float correlation(std::size_t i, std::size_t j, float both) const {
+    const float variances = mean(i) * (1 - mean(i)) * mean(j) * (1 - mean(j));
     if (variances <= 0) return 1;
-    const double covariance = static_cast<double>(both(i, j)) / n - mean_[i] * mean_[j];
+    const float covariance = both / n_ - mean(i) * mean(j);
     return covariance * covariance / variances;
   }
 
-  std::size_t blocks_;
-  std::vector<std::uint64_t> columns_;  // bit by bit, 64 of the sample in one integer
-  std::array<double, kBits> mean_{};
-  std::vector<double> squared_;
+  KeyBits::Workspace& workspace_;
+  const float n_;
+  std::array<float, kBits> set_{};  // in how many of the sample
 };
 
 }  // namespace
 
-KeyBits::KeyBits(std::span<const Descriptor> sample) {
+KeyBits::KeyBits(std::span<const Descriptor> sample, Workspace& workspace) noexcept {
   assert(!sample.empty());
-  const BitStatistics statistics(sample);
+  sample = sample.first(std::min(sample.size(), kSample));
+  const BitStatistics statistics(sample, workspace);
   // cost[table][bit]: what choosing `bit` next costs, but for how often it is used by now.
-  std::vector<std::array<double, kBits>> cost(kTables);
+  auto& cost = workspace.cost;
   for (auto& of_table : cost)
     for (std::size_t bit = 0; bit < kBits; ++bit) {
-      const double imbalance = 2 * statistics.mean(bit) - 1;
+      const float imbalance = 2 * statistics.mean(bit) - 1;
       of_table[bit] = kImbalance * imbalance * imbalance;
     }
 
-  constexpr double kChosen = 1e9;
-  std::array<double, kBits> used{};
+  constexpr float kChosen = 1e9F;
+  std::array<float, kBits> used{};
   std::uint64_t random = 1;
   for (auto& of_position : positions_)
     for (std::size_t table = 0; table < kTables; ++table) {
       std::size_t best = 0;
-      double least = kChosen;
+      float least = kChosen;
       for (std::size_t bit = 0; bit < kBits; ++bit) {
-        const double total = cost[table][bit] + kUse * used[bit] + kJitter * next_random(random);
+        const float total = cost[table][bit] + kUse * used[bit] + kJitter * next_random(random);
         if (total < least) {
           least = total;
           best = bit;
@@ -110,10 +118,13 @@ KeyBits::KeyBits(std::span<const Descriptor> sample) {
       of_position[table] = static_cast<std::uint8_t>(best);
       used[best] += 1;
       for (std::size_t bit = 0; bit < kBits; ++bit)
-        cost[table][bit] += statistics.squared_correlation(best, bit);
+        cost[table][bit] += workspace.squared_correlation[best][bit];
       cost[table][best] = kChosen;
     }
 }
+
+KeyBits::KeyBits(std::span<const Descriptor> sample)
+    : KeyBits(sample, *std::make_unique<Workspace>()) {}
 
 KeyBits::Keys KeyBits::keys(const Descriptor& descriptor, std::size_t bits) const {
   assert(bits <= kMaxBits);

@@ -200,7 +200,6 @@ class Vocabulary::Impl {
   // Inserts the planned new words, as many as there is room for.
   void make_words() {
     made_.clear();
-    words_.reserve(fresh_.size());
     for (const Descriptor& word : fresh_) {
       const bool room = words_.size() < capacity_.words;
       made_.push_back(room ? words_.insert(word) : kNoWord);

@@ -4,10 +4,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
-#include "index/key_bits.h"
+#include "base/huge_pages.h"
+#include "index/best_words.h"
 #include "index/neighbours.h"
+#include "index/word_buckets.h"
+#include "index/word_links.h"
 #include "loopd/features.h"
 
 namespace loopd {
@@ -15,36 +19,40 @@ namespace loopd {
 /// Binary words in one flat array, addressed by 32-bit ids (freed ids are reused, the last freed
 /// first), with an approximate look-up of the two nearest (DESIGN section 4).
 ///
-/// Up to about kLearnAt[0] words the look-up is a linear scan and exact. From there on every word
-/// is in KeyBits::kTables hash tables, each keyed by its own few bits of the descriptor; a look-up
-/// measures all words that share a bucket with the query in any table. The tables grow by linear
-/// hashing, one bucket a time (Litwin 1980), so that no insertion ever pauses to rebuild; only when
-/// the key bits are chosen anew, at kLearnAt words, are the tables made from scratch.
+/// Up to kLearnAt words the look-up is a linear scan and exact. From there on it measures the words
+/// that share a bucket with the query in any of the hash tables (WordBuckets), then, kRounds times,
+/// those that the nearest few found so far link to (WordLinks). The tables find what is alone, the
+/// links what lies in a crowd and what no table has in common with the query.
 ///
-/// A bucket is a chain of 64-byte chunks, one cache miss each. It holds at most kMaxBucket ids; a
-/// word that finds its bucket full is left out of that table. That bounds the cost of every call on
-/// hostile words; on real ones it is rare.
+/// Every call's cost is bounded, whatever the words. The longest is the insertion that makes
+/// kLearnAt words: it chooses the key bits and fills the tables, 2-5 ms.
 ///
 /// Deterministic: results depend on the calls made and on nothing else.
 /// Thread: one caller at a time (look-ups use scratch memory).
 class WordTable {
  public:
-  explicit WordTable(std::size_t capacity = 0) { (void)capacity; }
-  static std::size_t bytes_for(std::size_t capacity) { return 168 * capacity; }
+  /// A table that grows by reserve().
+  WordTable();
+  /// A table that holds `capacity` words without ever allocating again. Its memory is taken now but
+  /// touched only as words come. Throws std::bad_alloc.
+  explicit WordTable(std::size_t capacity);
+  /// bytes() of WordTable(capacity) at most, and exactly until it learns its key bits.
+  static std::size_t bytes_for(std::size_t capacity);
 
-  /// Makes room for `extra` more words, so that as many insertions cannot fail, and chooses the key
-  /// bits when it is time. Throws std::bad_alloc and then changes no result.
+  /// Makes room for `extra` more words, so that as many insertions cannot fail; within the capacity
+  /// given at construction it does nothing. Throws std::bad_alloc and then changes no result.
   void reserve(std::size_t extra);
 
-  /// Adds a word and returns its id. Equal words may be added. Cost: O(tables).
+  /// Adds a word and returns its id. Equal words may be added. Cost: about a third of a look-up's
+  /// if the word was a query of the latest look-up of several (of its first kRemembered, and they
+  /// come in the same order), else the look-up more.
   /// Precondition: reserve() made room for it.
   std::uint32_t insert(const Descriptor& word) noexcept;
 
-  /// Removes word `id`. Cost: O(tables). Precondition: `id` is of a word.
+  /// Removes word `id`. Cost: O(tables + links). Precondition: `id` is of a word.
   void erase(std::uint32_t id) noexcept;
 
-  /// The two nearest words found, by (distance, id); fewer than two if fewer were found. A word
-  /// equal to the query is found unless its bucket was full in every table.
+  /// The two nearest words found, by (distance, id); fewer than two if fewer were found.
   Neighbours two_nearest(const Descriptor& query);
 
   /// nearest[i] = two_nearest(queries[i]), faster. Sizes are equal.
@@ -52,8 +60,10 @@ class WordTable {
 
   /// Precondition: `id` is of a word.
   const Descriptor& descriptor(std::uint32_t id) const;
+  /// Precondition: id < id_limit().
+  bool live(std::uint32_t id) const { return ((live_[id / 64] >> (id % 64)) & 1U) != 0; }
 
-  std::size_t size() const { return words_.size() - free_ids_.size(); }
+  std::size_t size() const { return size_; }
   /// Every id is below it.
   std::size_t id_limit() const { return words_.size(); }
   /// Bytes on the heap, by capacity.
@@ -68,60 +78,83 @@ class WordTable {
   Load load() const;
 
  private:
-  static constexpr std::size_t kTables = KeyBits::kTables;
-  static constexpr std::array<std::size_t, 2> kLearnAt = {2048, 16384};
-  static constexpr std::size_t kSample = 4096;
-  static constexpr std::size_t kIdsPerChunk = 14;
-  static constexpr std::size_t kWordsPerBucket = 12;
-  static constexpr std::size_t kMaxBucket = 9 * kIdsPerChunk;
-  static constexpr std::uint32_t kNone = 0xffffffff;
+  static constexpr std::size_t kLearnAt = 2048;     // words
+  static constexpr std::size_t kRemembered = 2048;  // queries of a look-up
+  static constexpr std::size_t kGroup = 8;          // look-ups that go side by side
+  static constexpr std::size_t kRounds = 4;         // along the links
+  static constexpr std::size_t kOpened = 4;         // words whose links a round reads
+  static constexpr std::size_t kMaxDistance = 256;  // bits
+  static constexpr std::size_t kMostCandidates = WordBuckets::kTables * WordBuckets::kBucket;
 
-  // The head of a bucket, or a full chunk behind it: all chunks but the head are always full.
-  struct alignas(64) Chunk {
-    std::array<std::uint32_t, kIdsPerChunk> ids;
-    std::uint32_t total = 0;  // ids in the whole bucket (head only)
-    std::uint32_t next = kNone;
+  // Of the words met lately by a look-up, so that few are measured twice. It forgets; that costs
+  // time only.
+  class Met {
+   public:
+    void start() { ++look_up_; }
+    // Whether it is the first time, as far as it remembers.
+    bool first_time(std::uint32_t id) {
+      std::uint64_t& slot = slots_[(id * 0x9e3779b1U) >> (32 - kSlotBits)];
+      const std::uint64_t entry = (look_up_ << 32U) | id;
+      return std::exchange(slot, entry) != entry;
+    }
+
+   private:
+    static constexpr int kSlotBits = 8;
+    std::array<std::uint64_t, 1 << kSlotBits> slots_{};
+    std::uint64_t look_up_ = 0;
   };
 
-  // The hash tables, apart from the words they index.
-  struct Tables {
-    KeyBits bits;
-    std::size_t buckets = 0;     // of each table
-    std::vector<Chunk> heads;    // bucket b of table t: heads[b * kTables + t]
-    std::vector<Chunk> full;     // chunks behind the heads
-    std::uint32_t free = kNone;  // free chunks of `full`, linked
-    std::size_t free_count = 0;
+  // One look-up under way.
+  struct Search {
+    const Descriptor* query = nullptr;
+    BestWords best;
+    Met met;
+    WordBuckets::Places places;
+    std::array<std::uint32_t, kOpened> opened;
+    std::size_t opened_count = 0;
+    std::array<std::uint32_t, kMostCandidates> candidates;
+    std::size_t candidate_count = 0;
+  };
+  // A query of the latest look-up of several with what it found.
+  struct Remembered {
+    Descriptor query;
+    std::array<std::uint32_t, BestWords::kSize> found;
+    std::uint32_t count;
+  };
+  struct Found {
+    std::array<std::uint32_t, BestWords::kSize> ids;
+    std::size_t count = 0;
   };
 
-  // Where a descriptor's bucket of each table starts: indices into Tables::heads.
-  using Heads = std::array<std::uint32_t, kTables>;
+  void grow_to(std::size_t ids);
+  std::uint32_t take_id(const Descriptor& word) noexcept;
+  void put_into_tables(std::uint32_t id) noexcept;
+  void learn() noexcept;
+  void set_live(std::uint32_t id, bool live) noexcept;
+  void connect(std::uint32_t id, const Found& found) noexcept;
+  Found recall_or_find(const Descriptor& word) noexcept;
 
-  static std::size_t buckets_for(std::size_t words);
-  static std::size_t head_occupancy(std::uint32_t total);
-  static std::size_t key_bits_in_use(const Tables& tables);
-  static std::size_t bucket_of(const Tables& tables, std::uint32_t key);
+  void scan(Search& search);
+  void look_up(std::span<Search> searches);
+  void look_into_buckets(std::span<Search> searches);
+  void follow_links(std::span<Search> searches);
+  void gather_linked(Search& search) const;
+  void measure(Search& search);
+  std::uint16_t distance_to_keep(const Search& search) const;
+  void keep_up_to(std::uint16_t bound, Search& search);
 
-  static void reserve_chunks(Tables& tables, std::size_t words, std::size_t extra);
-  static void put(Tables& tables, Chunk& head, std::uint32_t id) noexcept;
-  static void take_last(Tables& tables, Chunk& head) noexcept;
-  static void take_out(Tables& tables, Chunk& head, std::uint32_t id) noexcept;
-  static void index(Tables& tables, const Descriptor& word, std::uint32_t id) noexcept;
-  void split(Tables& tables) const noexcept;
-  Tables learn() const;
+  std::vector<Descriptor, HugePageAllocator<Descriptor>> words_;
+  std::vector<WordLinks, HugePageAllocator<WordLinks>> links_;
+  std::vector<std::uint64_t> live_;  // a bit a word
+  std::size_t size_ = 0;
+  std::uint32_t free_ = WordLinks::kNone;  // the id freed last; the others behind it
+  WordBuckets buckets_;
 
-  Neighbours nearest_by_scan(const Descriptor& query);
-  Heads prefetch_buckets(const Descriptor& query) const;
-  std::span<const std::uint32_t> collect(const Heads& heads);
-  Neighbours nearest_in(const Heads& heads, const Descriptor& query);
-
-  std::vector<Descriptor> words_;
-  std::vector<std::uint8_t> live_;  // one byte an id
-  std::vector<std::uint32_t> free_ids_;
-  Tables tables_;
-  std::size_t learned_ = 0;  // how many of kLearnAt are done
-
-  std::vector<std::uint32_t> candidates_;  // scratch
-  std::vector<std::uint16_t> distances_;
+  std::vector<Remembered> remembered_;
+  std::size_t recalled_ = 0;      // of remembered_, before these a word is not sought
+  std::vector<Search> searches_;  // scratch, kGroup of them
+  std::array<std::uint16_t, kLearnAt> distances_;
+  std::array<std::uint16_t, kMostCandidates + 1> kept_;
 };
 
 }  // namespace loopd

@@ -268,7 +268,7 @@ TEST(WordTable, ReservedInsertionsAllocateNothing) {
     table.reserve(1500);
     const std::size_t bytes = table.bytes();
     for (std::size_t i = 0; i < 1500; ++i) table.insert(words[start + i]);
-    ASSERT_EQ(table.bytes(), bytes);
+    ASSERT_LE(table.bytes(), bytes);  // less once the key bits are chosen
   }
 }
 
