@@ -54,7 +54,7 @@ struct VerifyConfig {
   double epipolar_px = 2.0;
   int max_iterations = 1000;
   int min_inliers = 35;
-  double min_agreement = 0.65;
+  double min_agreement = 0.62;
   int seed = 1;
 };
 

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <opencv2/features2d.hpp>
 #include <string>
 #include <vector>
@@ -107,7 +108,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   words[0] = "camera.path=" + words[0];
-  const LoadedConfig loaded = load_config("", words);
+  const LoadedConfig loaded = load_config(std::nullopt, words);
   for (const std::string& mistake : loaded.mistakes) std::fprintf(stderr, "%s\n", mistake.c_str());
   if (!loaded.ok()) return 2;
   Times times;
