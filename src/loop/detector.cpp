@@ -92,6 +92,7 @@ class Detector::Impl {
         stillness_(config.loop),
         map_(config.loop, capacity_.images, capacity_.blob_chunks) {
     assert(validate(config).empty());
+    reserve();
   }
 
   // `describe` fills features_; all that follows is the same wherever they come from.
@@ -157,6 +158,32 @@ class Detector::Impl {
   std::size_t capacity_bytes() const { return capacity_.bytes; }
 
  private:
+  // What frames will need, so that none of them allocates.
+  void reserve() {
+    const auto points = static_cast<std::size_t>(config_.features.points);
+    const auto lines = static_cast<std::size_t>(config_.features.lines);
+    for (Verifier* verifier : {&point_lane_, &line_lane_}) verifier->reserve(points, lines);
+    trials_.resize(static_cast<std::size_t>(config_.loop.verified_islands) *
+                   static_cast<std::size_t>(config_.loop.verified_images));
+    for (Trial& trial : trials_) {
+      reserve(trial.features, points, lines);
+      trial.matches.points.reserve(points);
+      trial.matches.lines.reserve(lines);
+    }
+    for (Features* features : {&features_, &newest_features_, &shown_, &admitted_})
+      reserve(*features, points, lines);
+    for (ImageWords* words : {&admitted_words_, &leaving_}) words->resize(points, lines);
+    for (auto* candidates : {&points_, &lines_}) candidates->reserve(capacity_.images);
+    checked_.reserve(trials_.size());
+  }
+
+  static void reserve(Features& features, std::size_t points, std::size_t lines) {
+    features.points.reserve(points);
+    features.point_descriptors.reserve(points);
+    features.lines.reserve(lines);
+    features.line_descriptors.reserve(lines);
+  }
+
   // One candidate of this frame and what its verification found.
   struct Trial {
     Island island;
@@ -250,7 +277,7 @@ class Detector::Impl {
   void find_islands() {
     placed_.clear();
     for (const Candidate& c : fused_) placed_.push_back({c.image, map_.position(c.image), c.score});
-    islands_ = build_islands(placed_, static_cast<std::uint32_t>(config_.loop.island_gap));
+    island_builder_.build(placed_, static_cast<std::uint32_t>(config_.loop.island_gap), islands_);
     prefer_island(islands_, priority_);
     const auto most = static_cast<std::size_t>(config_.loop.verified_islands);
     if (islands_.size() > most) islands_.resize(most);
@@ -284,7 +311,6 @@ class Detector::Impl {
       for (const Candidate& c : fused_) {
         if (c.image < island.first || c.image > island.last) continue;
         if (left-- == 0) break;
-        if (trial_count_ == trials_.size()) trials_.emplace_back();
         trials_[trial_count_].island = island;
         trials_[trial_count_++].candidate = c;
       }
@@ -473,9 +499,9 @@ class Detector::Impl {
   std::vector<Candidate> lines_;
   std::vector<Candidate> fused_;
   std::vector<PlacedCandidate> placed_;
+  IslandBuilder island_builder_;
   std::vector<Island> islands_;
-  std::vector<Trial>
-      trials_;  // grows to its largest and stays; the first trial_count_ are this frame's
+  std::vector<Trial> trials_;  // the first trial_count_ are this frame's
   std::size_t trial_count_ = 0;
   std::vector<std::size_t> checked_;  // trials whose geometry is checked
 };

@@ -81,6 +81,29 @@ int count_distinct_points(const InlierPairs& pairs, const Features& query,
   return distinct;
 }
 
+// Features that all differ, all over the image.
+Features scattered_features(std::size_t points, std::size_t lines) {
+  Random random(1);
+  const auto place = [&] { return static_cast<float>(random.below(4096)); };
+  const auto descriptor = [&] {
+    Descriptor made;
+    for (auto& word : made.words) word = random.next();
+    return made;
+  };
+  Features features;
+  features.width_px = features.height_px = 4096;
+  for (std::size_t i = 0; i < points; ++i) {
+    features.points.push_back({place(), place(), 31, 0});
+    features.point_descriptors.push_back(descriptor());
+  }
+  for (std::size_t i = 0; i < lines; ++i) {
+    const float x = place(), y = place();
+    features.lines.push_back({x, y, x + 100, y + 10});
+    features.line_descriptors.push_back(descriptor());
+  }
+  return features;
+}
+
 // Points of one scene turn together from one image to the other.
 constexpr double kMostTurnApart = 30 * (kPi / 180);
 
@@ -227,6 +250,14 @@ class Verifier::Impl {
 
 Verifier::Verifier(const VerifyConfig& config) : impl_(std::make_unique<Impl>(config)) {}
 Verifier::~Verifier() = default;
+
+void Verifier::reserve(std::size_t points, std::size_t lines) {
+  const Features all = scattered_features(points, lines);
+  ImageMatches matches;
+  InlierPairs pairs;
+  match(all, all, matches);
+  check(all, all, matches, 1, pairs);
+}
 
 void Verifier::match(const Features& query, const Features& candidate, ImageMatches& matches) {
   assert(query.points.size() == query.point_descriptors.size());

@@ -33,6 +33,10 @@ class Verifier {
   explicit Verifier(const VerifyConfig& config);
   ~Verifier();
 
+  /// Allocates all that images of at most so many features will need, by verifying one against
+  /// itself. Throws std::bad_alloc.
+  void reserve(std::size_t points, std::size_t lines);
+
   /// 6. Fills `matches`, which keeps its capacity. Any features are answered.
   void match(const Features& query, const Features& candidate, ImageMatches& matches);
 

@@ -9,6 +9,13 @@
 namespace loopd {
 namespace {
 
+std::vector<Island> build_islands(std::span<const PlacedCandidate> candidates, std::uint32_t gap) {
+  IslandBuilder builder;
+  std::vector<Island> islands{{7, 9, 8, 1.0}};  // must go
+  builder.build(candidates, gap, islands);
+  return islands;
+}
+
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
