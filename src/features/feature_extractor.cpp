@@ -25,6 +25,7 @@ void FeatureExtractor::prepare(const LumaView& image, Features& features) {
   pyramid_.start(reduce_image(image, factor_, reduced_), config_.scale_factor,
                  std::max(2, config_.levels));
   pyramid_.build_next();
+  image_ = pyramid_.level(0);
   shrunk_ = pyramid_.level(1);
 }
 
@@ -39,8 +40,7 @@ void FeatureExtractor::extract_points(Features& features) {
 }
 
 void FeatureExtractor::extract_lines(Features& features) {
-  const LumaView image = pyramid_.level(0);
-  lines_.extract(shrunk_, image.width_px, image.height_px, features.lines,
+  lines_.extract(shrunk_, image_.width_px, image_.height_px, features.lines,
                  features.line_descriptors);
   if (factor_ == 1) return;
   for (Line& line : features.lines)

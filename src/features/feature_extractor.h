@@ -31,7 +31,9 @@ class FeatureExtractor {
   PointExtractor points_;
   LineExtractor lines_;
   ImagePyramid pyramid_;
-  LumaView shrunk_;  // its level 1
+  // Its levels 0 and 1: the points lane builds the others while the lines lane reads these.
+  LumaView image_;
+  LumaView shrunk_;
   int factor_ = 1;
   std::vector<std::uint8_t> reduced_;
 };

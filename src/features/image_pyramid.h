@@ -12,7 +12,8 @@ namespace loopd {
 /// An image and its reductions, each `scale` times smaller than the one before, by bilinear
 /// interpolation in integers (positions to 1/256 pixel, rounded to a grey level after each of the
 /// two directions). Level 0 is the caller's image, not a copy. Memory is kept from image to image.
-/// Thread: one caller at a time; built levels may be read by any number.
+/// Thread: one caller at a time; the pixels of a built level may be read by any number, but level()
+/// is a call as any other.
 class ImagePyramid {
  public:
   /// Eight pixels of a row at once: which of 16 bytes from `base` on they are mixed of, as pairs.
